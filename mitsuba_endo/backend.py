@@ -1,0 +1,114 @@
+"""Starting Mitsuba: finds LLVM, sets threads, registers the plugins, chooses a variant.
+
+Entry points call :func:`use` first. Dr.Jit reads ``DRJIT_LIBLLVM_PATH`` once, when it is imported,
+so the library is looked for before that; importing the package itself starts nothing.
+"""
+
+import ctypes
+import importlib.metadata
+import os
+import sys
+from pathlib import Path
+
+from .errors import InputError
+
+LLVM_PACKAGE = "karellen-llvm-core"
+MINIMUM_LLVM = (17,)
+VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
+
+
+def use(*variants: str) -> str:
+    """Load Mitsuba with the first usable of ``variants`` and return its name.
+
+    Without arguments: CUDA where there is a GPU, LLVM elsewhere. Plugins stay registered however
+    often the variant changes afterwards.
+
+    Raises:
+        InputError: Dr.Jit was imported before LLVM could be pointed out, or no usable LLVM.
+    """
+    locate_llvm()
+    import mitsuba as mi
+
+    from . import plugins
+
+    plugins.register_all()
+    try:
+        mi.set_variant(*(variants or VARIANTS))
+    except (ImportError, RuntimeError) as error:
+        raise InputError(
+            f"Mitsuba cannot start ({_first_line(error)})", todo="run `mitsuba-endo doctor`"
+        ) from error
+    variant = mi.variant()
+    assert variant is not None  # set_variant has just succeeded
+    if variant.startswith("llvm"):
+        _check_llvm()
+    _set_threads()
+    return variant
+
+
+def ensure() -> str:
+    """Return the active variant, starting Mitsuba with the default ones if none is active."""
+    mi = sys.modules.get("mitsuba")
+    return (mi.variant() if mi else None) or use()
+
+
+def locate_llvm() -> Path | None:
+    """Set ``DRJIT_LIBLLVM_PATH`` to the LLVM library of the installed wheel; return its path.
+
+    A path set by the user is respected; None means that Dr.Jit will search the system.
+    """
+    if "DRJIT_LIBLLVM_PATH" in os.environ:
+        return Path(os.environ["DRJIT_LIBLLVM_PATH"])
+    library = _wheel_library("libLLVM")
+    if library is None:
+        return None
+    _preload_libcxx()
+    os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
+    return library
+
+
+def _wheel_library(stem: str) -> Path | None:
+    try:
+        files = importlib.metadata.files(LLVM_PACKAGE) or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    found = [Path(str(f.locate())) for f in files if f.name.startswith(stem) and ".so" in f.name]
+    # The versioned file is real; its symlinks appear only at the first interpreter start.
+    existing = sorted({p.resolve() for p in found if p.exists()})
+    return existing[0] if existing else None
+
+
+def _preload_libcxx() -> None:
+    """Load the wheel's C++ runtime, whose symlinks a read-only environment never gets."""
+    for stem in ("libunwind", "libc++abi", "libc++"):
+        library = _wheel_library(f"{stem}.so")
+        if library is not None:
+            try:
+                ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+            except OSError:
+                return  # LLVM then says itself what it misses
+
+
+def _check_llvm() -> None:
+    """Refuse an LLVM that would abort the process at the first minimum or clip."""
+    import drjit as dr
+
+    version = dr.detail.llvm_version()
+    if tuple(version) < MINIMUM_LLVM:
+        raise InputError(
+            f"LLVM {'.'.join(map(str, version))} is too old for Dr.Jit",
+            "DRJIT_LIBLLVM_PATH",
+            "install LLVM 17 or newer and run `mitsuba-endo doctor`",
+        )
+
+
+def _set_threads() -> None:
+    """Give Dr.Jit at least two threads: with one, reading and writing EXR files deadlocks."""
+    import drjit as dr
+
+    if dr.thread_count() < 2:
+        dr.set_thread_count(2)
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else repr(error)

@@ -1,0 +1,5 @@
+"""Transforms, lens distortion, camera models and projector laws.
+
+Formulas are written once over components (x, y, z) and run on NumPy arrays and on Dr.Jit
+arrays alike (see :mod:`.arrays`); nothing here imports Mitsuba.
+"""

@@ -1,0 +1,129 @@
+"""Lens distortion of normalised image coordinates, after OpenCV.
+
+Both models map ideal normalised coordinates to distorted ones; ``remove`` is the exact inverse.
+Coefficients may be floats or Dr.Jit scalars, and both directions are differentiable with respect
+to the coordinates and the coefficients.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .arrays import Array, namespace
+
+_FIXED_POINT_STEPS = 8
+_NEWTON_STEPS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class BrownDistortion:
+    """Radial, tangential and rational distortion (k1, k2, p1, p2, k3[, k4, k5, k6]).
+
+    With r2 = x^2 + y^2 and g = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3):
+    x' = g x + 2 p1 x y + p2 (r2 + 2 x^2), y' = g y + p1 (r2 + 2 y^2) + 2 p2 x y.
+    Source: OpenCV, "Camera Calibration and 3D Reconstruction".
+    """
+
+    coefficients: Sequence[Array] = ()
+    """Up to 8 values in OpenCV order; missing ones are zero, none at all is the identity."""
+
+    def apply(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Distort ideal normalised coordinates."""
+        if not len(self.coefficients):
+            return x, y
+        k1, k2, p1, p2, k3, k4, k5, k6 = self._padded()
+        r2 = x * x + y * y
+        g = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        return (
+            g * x + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            g * y + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        )
+
+    def remove(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Undo the distortion.
+
+        Fixed-point steps bring the iterate near, Newton steps make it exact. In Dr.Jit only the
+        last Newton step is differentiated: at the solution x it is x - J^-1 (D(x) - target), whose
+        derivative is that of the implicit function.
+        """
+        if not len(self.coefficients):
+            return x, y
+        xp = namespace(x, y, *self.coefficients)
+        frozen = BrownDistortion([xp.detach(c) for c in self.coefficients])
+        xt, yt = xp.detach(x), xp.detach(y)
+        a, b = xt, yt
+        for _ in range(_FIXED_POINT_STEPS):
+            da, db = frozen.apply(a, b)
+            # Half steps: full ones oscillate under strong barrel distortion.
+            a, b = a + 0.5 * (xt - da), b + 0.5 * (yt - db)
+        for _ in range(_NEWTON_STEPS):
+            a, b = frozen._newton(frozen, a, b, xt, yt)
+        return frozen._newton(self, xp.detach(a), xp.detach(b), x, y)
+
+    def jacobian(self, x: Array, y: Array) -> tuple[Array, Array, Array]:
+        """Return dx'/dx, dx'/dy = dy'/dx, dy'/dy."""
+        if not len(self.coefficients):
+            return 1 + 0 * x, 0 * x, 1 + 0 * x
+        k1, k2, p1, p2, k3, k4, k5, k6 = self._padded()
+        r2 = x * x + y * y
+        top = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        bottom = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        d_top = k1 + r2 * (2 * k2 + 3 * k3 * r2)
+        d_bottom = k4 + r2 * (2 * k5 + 3 * k6 * r2)
+        g = top / bottom
+        dg = (d_top - g * d_bottom) / bottom  # derivative with respect to r2
+        cross = 2 * (x * y * dg + p1 * x + p2 * y)
+        return (
+            g + 2 * (x * x * dg + p1 * y + 3 * p2 * x),
+            cross,
+            g + 2 * (y * y * dg + 3 * p1 * y + p2 * x),
+        )
+
+    def _newton(
+        self, model: "BrownDistortion", a: Array, b: Array, xt: Array, yt: Array
+    ) -> tuple[Array, Array]:
+        """One Newton step at (a, b): the Jacobian is this object's, the residual is ``model``'s."""
+        jxx, jxy, jyy = self.jacobian(a, b)
+        da, db = model.apply(a, b)
+        ra, rb = da - xt, db - yt
+        det = jxx * jyy - jxy * jxy
+        return a - (jyy * ra - jxy * rb) / det, b - (jxx * rb - jxy * ra) / det
+
+    def _padded(self) -> list[Array]:
+        return [*self.coefficients, *[0.0] * (8 - len(self.coefficients))]
+
+
+@dataclass(frozen=True, eq=False)
+class FisheyeDistortion:
+    """OpenCV fisheye: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
+
+    theta is the angle to the optical axis and theta_d the distance of the normalised image point
+    from the centre. Source: OpenCV, module ``fisheye``.
+    """
+
+    coefficients: Sequence[Array] = ()
+    """Up to 4 values k1..k4; missing ones are zero."""
+
+    def apply(self, theta: Array) -> Array:
+        """Return theta_d."""
+        k1, k2, k3, k4 = self._padded()
+        t2 = theta * theta
+        return theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+
+    def remove(self, theta_d: Array) -> Array:
+        """Return theta, by Newton's method (differentiable as in :class:`BrownDistortion`)."""
+        xp = namespace(theta_d, *self.coefficients)
+        frozen = FisheyeDistortion([xp.detach(c) for c in self.coefficients])
+        target = xp.detach(theta_d)
+        theta = target
+        for _ in range(_FIXED_POINT_STEPS + _NEWTON_STEPS):
+            theta = theta - (frozen.apply(theta) - target) / frozen._slope(theta)
+        theta = xp.detach(theta)
+        return theta - (self.apply(theta) - theta_d) / frozen._slope(theta)
+
+    def _slope(self, theta: Array) -> Array:
+        k1, k2, k3, k4 = self._padded()
+        t2 = theta * theta
+        return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
+
+    def _padded(self) -> list[Array]:
+        return [*self.coefficients, *[0.0] * (4 - len(self.coefficients))]

@@ -1,0 +1,1 @@
+"""Scene descriptions of the package (installed as ``mitsuba_endo.scenes``)."""
