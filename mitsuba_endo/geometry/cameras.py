@@ -61,7 +61,7 @@ class OpenCVCamera:
 
 @register_camera
 class OpenCVFisheye:
-    """Equidistant fisheye with four terms (OpenCV ``fisheye``), fields of view beyond 180 degrees."""
+    """Equidistant fisheye with four terms (OpenCV ``fisheye``), also beyond 180 degrees."""
 
     name: ClassVar[str] = "opencv_fisheye"
     max_coefficients: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)

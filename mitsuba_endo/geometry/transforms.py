@@ -48,7 +48,7 @@ class RigidTransform:
         return directions @ self.R.T
 
     def perturbed(self, step: NDArray[np.float64]) -> "RigidTransform":
-        """Return R' = exp([w]x) R, t' = t + dt for ``step`` = (w, dt), the solver's chart of SE(3)."""
+        """Return (exp([w]x) R, t + dt) for ``step`` = (w, dt), the solver's chart of SE(3)."""
         return RigidTransform(rotation_from_vector(step[:3]) @ self.R, self.t + step[3:])
 
     def matrix(self) -> NDArray[np.float64]:

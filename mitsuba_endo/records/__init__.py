@@ -1,0 +1,1 @@
+"""Typed records that pass between the stages, each with its file format."""

@@ -1,0 +1,68 @@
+"""Everything a calibration hands on: the solution and the arrays that belong to it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.cameras import CameraModel
+from .solution import Solution
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceEstimate:
+    """Triangle mesh of what the frames saw, in the first camera's frame."""
+
+    vertices: NDArray[np.float64]
+    """(V, 3) in the solution's unit."""
+    faces: NDArray[np.int64]
+    """(F, 3) vertex indices."""
+    std: NDArray[np.float64] | None = None
+    """(V,) standard deviation along the viewing direction, same unit; None if not computed."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMaps:
+    """Images of one frame."""
+
+    name: str
+    observed: NDArray[np.float32]
+    """(H, W, 2) observed projector coordinates, pattern pixels, NaN = missing."""
+    rendered: NDArray[np.float32]
+    """(H, W, 2) projector coordinates rendered from the solution, NaN = not seen."""
+    used: NDArray[np.bool_]
+    """(H, W) correspondences that the solver used."""
+
+    @property
+    def residual(self) -> NDArray[np.float32]:
+        """(H, W, 2) observed minus rendered, pattern pixels."""
+        return self.observed - self.rendered
+
+
+@dataclass(frozen=True)
+class TraceRow:
+    """One iteration of the solver, a line of ``trace.csv``."""
+
+    iteration: int
+    seconds: float
+    """Since the start of the optimisation."""
+    cost: float
+    """Robust cost per correspondence, in units of the noise scale squared."""
+    focal: float | None
+    """Pattern pixels; None when it is per frame."""
+    damping: float
+    scale_px: float
+    """Scale of the robust loss, pattern pixels."""
+    step: float
+    """Largest change of an unknown in this iteration, relative to its own scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Result of :func:`mitsuba_endo.solve.calibrate.calibrate`."""
+
+    solution: Solution
+    camera: CameraModel
+    surface: SurfaceEstimate
+    frames: list[FrameMaps]
+    trace: list[TraceRow] = field(default_factory=list)

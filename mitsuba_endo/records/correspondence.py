@@ -1,0 +1,119 @@
+"""Correspondence maps: for each camera pixel the projector coordinate it sees."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..files import atomic_path
+
+CHANNELS = ("projector.x", "projector.y")
+SUFFIXES = (".exr", ".npz")
+
+
+@dataclass(frozen=True, eq=False)
+class CorrespondenceMap:
+    """Observed projector coordinates of one frame."""
+
+    q: NDArray[np.float32]
+    """(H, W, 2) pattern pixels (x, y), integer = pixel centre, NaN = missing."""
+    name: str
+    """How the frame is called in results, usually its file name."""
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(H, W) pixels that have a correspondence."""
+        return np.isfinite(self.q).all(-1)
+
+
+def load_map(path: str | Path) -> CorrespondenceMap:
+    """Read a map from OpenEXR (channels projector.x, projector.y) or npz (array ``map``).
+
+    Raises:
+        InputError: missing file, missing channels, wrong shape, nothing finite, wrong units.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("no such file", str(path), "check the path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"unknown kind of map '{path.suffix}'", str(path), "give an .exr or .npz file"
+        )
+    q = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
+    _check(q, str(path))
+    return CorrespondenceMap(np.where(np.isfinite(q).all(-1, keepdims=True), q, np.nan), path.name)
+
+
+def save_map(path: str | Path, q: NDArray[np.floating]) -> None:
+    """Write an (H, W, 2) map as OpenEXR or npz, by the suffix of ``path``."""
+    q = np.ascontiguousarray(q, dtype=np.float32)
+    if Path(path).suffix.lower() == ".npz":
+        with atomic_path(path) as aside:
+            np.savez_compressed(aside, map=q)
+        return
+    write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)})
+
+
+def write_exr(path: str | Path, channels: dict[str, NDArray[np.floating]]) -> None:
+    """Write (H, W) channels as a float32 OpenEXR file."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    arrays = {k: np.ascontiguousarray(v, dtype=np.float32) for k, v in channels.items()}
+    with atomic_path(path) as aside:
+        OpenEXR.File(header, arrays).write(str(aside))
+
+
+def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
+    """Read every channel of an OpenEXR file as (H, W) float32.
+
+    Raises:
+        InputError: missing or damaged file.
+    """
+    if not Path(path).is_file():
+        raise InputError("no such file", str(path), "check the path")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            return {k: np.array(c.pixels, np.float32) for k, c in file.channels().items()}
+    except (RuntimeError, ValueError, TypeError):
+        raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
+
+
+def _read_exr(path: Path) -> NDArray[np.float32]:
+    channels = read_exr(path)
+    missing = [name for name in CHANNELS if name not in channels]
+    if missing:
+        raise InputError(
+            f"channel {missing[0]} is missing", str(path), f"name them {' and '.join(CHANNELS)}"
+        )
+    return np.stack([channels[name] for name in CHANNELS], -1)
+
+
+def _read_npz(path: Path) -> NDArray[np.float32]:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            if "map" not in data:
+                raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
+            q = np.asarray(data["map"])
+    except (ValueError, OSError, EOFError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("is not a readable npz file", str(path), "make it again") from None
+    if q.ndim != 3 or q.shape[2] != 2 or q.dtype.kind not in "fiu":
+        raise InputError(
+            f"array 'map' is {q.dtype} {'x'.join(map(str, q.shape))}", str(path),
+            "store projector x and y as numbers, HxWx2",
+        )  # fmt: skip
+    return q.astype(np.float32)
+
+
+def _check(q: NDArray[np.float32], source: str) -> None:
+    finite = q[np.isfinite(q).all(-1)]
+    if not len(finite):
+        raise InputError("the map has no finite value", source, "check how it was decoded")
+    if finite.min() >= 0 and finite.max() <= 1:
+        raise InputError(
+            "all projector coordinates lie between 0 and 1", source,
+            "give them in pattern pixels, not normalised",
+        )  # fmt: skip

@@ -1,0 +1,292 @@
+"""The rig file: what is known of camera and projector, and what is to be found."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cv2
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
+
+from ..errors import InputError
+from ..geometry.cameras import CAMERAS, CameraModel
+from ..geometry.laws import LAWS, ProjectorModel, projector_model
+from ..geometry.transforms import RigidTransform
+from .validation import Record, read_yaml, validate
+
+Matrix3 = Annotated[
+    list[Annotated[list[float], Field(min_length=3, max_length=3)]],
+    Field(min_length=3, max_length=3),
+]
+Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
+Vector2 = Annotated[list[float], Field(min_length=2, max_length=2)]
+Sharing = Literal["fixed", "shared", "per_frame"]
+AUTO_LAW = "auto"
+MAX_PROJECTOR_DISTORTION = 5
+
+
+class Camera(Record):
+    """Intrinsics of the camera, known beforehand."""
+
+    model: str = "opencv"
+    """``opencv`` (pinhole + Brown) or ``opencv_fisheye``."""
+    width: PositiveInt
+    """Pixels."""
+    height: PositiveInt
+    """Pixels."""
+    K: Matrix3
+    """Camera matrix, pixels, integer pixel = pixel centre."""
+    distortion: list[float] = []
+    """Coefficients in OpenCV order: k1, k2, p1, p2, k3[, k4, k5, k6], or fisheye k1..k4."""
+
+    @field_validator("model")
+    @classmethod
+    def _known_model(cls, value: str) -> str:
+        if value not in CAMERAS:
+            raise ValueError(f"unknown camera model '{value}'; choose from {', '.join(CAMERAS)}")
+        return value
+
+    @field_validator("K")
+    @classmethod
+    def _camera_matrix(cls, value: list[list[float]]) -> list[list[float]]:
+        if not (value[0][0] > 0 and value[1][1] > 0):
+            raise ValueError(
+                "the focal lengths on the diagonal are not positive; give fx and fy in pixels"
+            )
+        if value[0][1] or value[1][0] or value[2] != [0, 0, 1]:
+            raise ValueError("is not [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]; remove skew and scale")
+        return value
+
+    @model_validator(mode="after")
+    def _coefficient_count(self) -> "Camera":
+        allowed = CAMERAS[self.model].max_coefficients
+        if len(self.distortion) not in allowed:
+            raise ValueError(
+                f"{len(self.distortion)} distortion coefficients do not fit model {self.model}; "
+                f"give one of {', '.join(map(str, allowed))}"
+            )
+        return self
+
+    def to_model(self) -> CameraModel:
+        return CameraModel(
+            self.model, self.width, self.height, np.array(self.K, float), tuple(self.distortion)
+        )
+
+    @classmethod
+    def from_model(cls, camera: CameraModel) -> "Camera":
+        return cls(
+            model=camera.model, width=camera.width, height=camera.height,
+            K=np.asarray(camera.K).tolist(), distortion=[float(c) for c in camera.distortion],
+        )  # fmt: skip
+
+
+class Focal(Record):
+    """Focal length of the projector, pattern pixels; written as a number it is known and fixed."""
+
+    value: PositiveFloat | None = None
+    """Known value or starting guess; not needed when it is to be found."""
+    refine: bool = True
+    """Whether it is an unknown."""
+
+    @model_validator(mode="after")
+    def _known_if_fixed(self) -> "Focal":
+        if self.value is None and not self.refine:
+            raise ValueError("refine is false but value is missing; give value or refine: true")
+        return self
+
+
+class Pose(Record):
+    """Rigid transform X_projector = R X_camera + t; R is 3x3 or a rotation vector (radians)."""
+
+    R: Matrix3 | Vector3
+    t: Vector3
+
+    @field_validator("R")
+    @classmethod
+    def _rotation(cls, value: Any) -> Any:
+        R = np.asarray(value, float)
+        if R.shape == (3, 3) and not (
+            np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0
+        ):
+            raise ValueError("is not a rotation matrix; its rows must be orthonormal, det = +1")
+        return value
+
+    def to_transform(self) -> RigidTransform:
+        return RigidTransform.of(self.R, self.t)
+
+
+class Projector(Record):
+    """Intrinsics of the projector and what is to be found of it."""
+
+    law: str = "direction_cosine"
+    """``pinhole``, ``direction_cosine``, or ``auto`` to fit both and compare."""
+    width: PositiveInt
+    """Pattern pixels."""
+    height: PositiveInt
+    """Pattern pixels."""
+    focal: Focal = Focal()
+    centre: Vector2 | None = None
+    """Principal point, pattern pixels; default: the middle of the pattern."""
+    aspect: PositiveFloat = 1.0
+    """fy / fx."""
+    distortion: Annotated[list[float], Field(max_length=MAX_PROJECTOR_DISTORTION)] = []
+    """k1, k2, p1, p2, k3 on the law's normalised coordinates, shorter lists allowed."""
+    pose: Pose | None = None
+    """Start for projector_from_camera, mm."""
+
+    @field_validator("law")
+    @classmethod
+    def _known_law(cls, value: str) -> str:
+        if value != AUTO_LAW and value not in LAWS:
+            names = ", ".join([*LAWS, AUTO_LAW])
+            raise ValueError(f"unknown projector law '{value}'; choose from {names}")
+        return value
+
+    @field_validator("focal", mode="before")
+    @classmethod
+    def _number_is_fixed(cls, value: Any) -> Any:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return {"value": value, "refine": False}
+        return value
+
+    @property
+    def middle(self) -> list[float]:
+        """Middle of the pattern under the pixel-centre convention."""
+        return [(self.width - 1) / 2, (self.height - 1) / 2]
+
+    def to_model(self, law: str | None = None) -> ProjectorModel:
+        """Build the model; an unknown focal length becomes the pattern's width."""
+        return projector_model(
+            law or self.law, self.focal.value or float(self.width), self.centre or self.middle,
+            self.aspect, self.distortion,
+        )  # fmt: skip
+
+
+class KnownDistance(Record):
+    """Distance between two points of the surface seen in one frame."""
+
+    pixels: Annotated[list[Vector2], Field(min_length=2, max_length=2)]
+    """The two points, camera pixels."""
+    mm: PositiveFloat
+    std: float = Field(0.0, ge=0)
+    """Standard deviation of ``mm``."""
+    frame: int = Field(0, ge=0)
+    """Index of the frame."""
+
+
+class Scale(Record):
+    """Where the unit of length comes from: correspondences alone never fix it."""
+
+    baseline: PositiveFloat | None = None
+    """|t| of the first frame's projector_from_camera, mm."""
+    baseline_std: float = Field(0.0, ge=0)
+    """Standard deviation of ``baseline``, mm."""
+    known_distance: KnownDistance | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "Scale":
+        if self.baseline is not None and self.known_distance is not None:
+            raise ValueError("baseline and known_distance are both given; keep one")
+        if self.baseline is None and self.baseline_std:
+            raise ValueError("baseline_std is given without baseline; add baseline")
+        return self
+
+    @property
+    def kind(self) -> Literal["baseline", "known_distance", "up_to_scale"]:
+        if self.baseline is not None:
+            return "baseline"
+        return "known_distance" if self.known_distance else "up_to_scale"
+
+
+class Share(Record):
+    """Sharing plan: for each block of unknowns ``fixed``, ``shared`` or ``per_frame``."""
+
+    surface: Sharing = "shared"
+    camera_pose: Sharing = "per_frame"
+    projector_pose: Sharing = "per_frame"
+    focal: Sharing | None = None
+    """Default: ``shared`` if ``projector.focal.refine``, else ``fixed``."""
+    centre: Sharing = "fixed"
+    aspect: Sharing = "fixed"
+    distortion: Sharing = "fixed"
+
+
+class Drift(Record):
+    """Random walk of the projector in its channel from frame to frame (spread per step)."""
+
+    insertion_mm: PositiveFloat | None = None
+    """Standard deviation of the step along the projector's axis, mm."""
+    roll_deg: PositiveFloat | None = None
+    """Standard deviation of the step about the projector's axis, degrees."""
+    lateral_mm: PositiveFloat | None = None
+    """Standard deviation of the step across the axis, mm."""
+    tilt_deg: PositiveFloat | None = None
+    """Standard deviation of the step of the axis' direction, degrees."""
+
+
+class Rig(Record):
+    """Contents of ``rig.yaml``."""
+
+    units: Literal["mm"] = "mm"
+    camera: Camera
+    projector: Projector
+    scale: Scale = Scale()
+    share: Share = Share()
+    drift: Drift | None = None
+
+    @field_validator("scale", mode="before")
+    @classmethod
+    def _up_to_scale(cls, value: Any) -> Any:
+        if value in ("up_to_scale", {"up_to_scale": True}, {"up_to_scale": None}, None):
+            return {}
+        return value
+
+
+def load_rig(path: str | Path) -> Rig:
+    """Read and validate ``rig.yaml``; ``camera`` may name an OpenCV FileStorage file instead.
+
+    Raises:
+        InputError: names the file and field.
+    """
+    path = Path(path)
+    data = read_yaml(path)
+    camera = data.get("camera")
+    if isinstance(camera, str):
+        data["camera"] = _opencv_camera(path.parent / camera)
+    return validate(Rig, data, path.name)
+
+
+def _opencv_camera(path: Path) -> dict[str, Any]:
+    """Read the camera part from a file written by OpenCV's calibration tools."""
+    if not path.is_file():
+        raise InputError("no such file", str(path), "check `camera` in the rig file")
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    except (cv2.error, SystemError):
+        raise InputError("is not an OpenCV FileStorage", str(path), "check the file") from None
+    try:
+        K = _first_node(storage, ("camera_matrix", "cameraMatrix", "K", "M1"))
+        if K is None:
+            raise InputError("camera_matrix is missing", str(path), "export it with OpenCV")
+        d = _first_node(
+            storage, ("distortion_coefficients", "distCoeffs", "dist_coeffs", "D", "D1")
+        )
+        width, height = (storage.getNode(f"image_{n}") for n in ("width", "height"))
+        if width.empty() or height.empty():
+            raise InputError("image_width or image_height is missing", str(path), "add them")
+        fisheye = storage.getNode("fisheye_model")
+        is_fisheye = not fisheye.empty() and bool(fisheye.real())
+        return {
+            "model": "opencv_fisheye" if is_fisheye else "opencv",
+            "width": int(width.real()), "height": int(height.real()), "K": K.tolist(),
+            "distortion": [] if d is None else d.ravel().tolist(),
+        }  # fmt: skip
+    finally:
+        storage.release()
+
+
+def _first_node(storage: cv2.FileStorage, names: tuple[str, ...]) -> np.ndarray | None:
+    for name in names:
+        node = storage.getNode(name)
+        if not node.empty():
+            return node.mat()
+    return None

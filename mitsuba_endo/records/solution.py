@@ -1,0 +1,170 @@
+"""The result of a calibration, and the truth of a synthetic one: the same structure."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from ..files import atomic_path
+from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.transforms import RigidTransform
+from .rig import Camera, Matrix3, Vector3
+from .validation import Record, read_json, validate
+
+SCHEMA = 1
+
+
+class Outcome(StrEnum):
+    """How a calibration ended."""
+
+    CONVERGED = "converged"
+    """The parameters stopped changing."""
+    MAX_ITERATIONS = "max_iterations"
+    """Stopped by the limit on iterations: the values may still move."""
+    STALLED = "stalled"
+    """No step lowers the cost and the parameters had not settled."""
+    INTERRUPTED = "interrupted"
+    """Stopped by the user; the values are those of the last iteration."""
+    TRUTH = "truth"
+    """Not a calibration but the exact values of a synthetic scene."""
+
+
+Status = Literal["measured", "weak", "unobservable", "fixed"]
+
+
+class Estimate(Record):
+    """A number or vector with its standard deviation; null when it could not be determined."""
+
+    value: float | list[float] | None
+    std: float | list[float] | None = None
+    """The larger of the formal and the block-jackknife standard deviation, same unit."""
+    std_formal: float | list[float] | None = None
+    """From the Hessian at the solution: right if the model is."""
+    std_jackknife: float | list[float] | None = None
+    """From leaving out image blocks or frames: sees errors of the model too."""
+    status: Status
+    reason: str | None = None
+    """Why the value is weak or null, and what would help."""
+
+
+class PoseEstimate(Record):
+    """X_to = R X_from + t."""
+
+    R: Matrix3 | None
+    t: Vector3 | None
+    std: list[float] | None = None
+    """Six values: rotation vector (radians), translation (the solution's unit)."""
+    std_formal: list[float] | None = None
+    std_jackknife: list[float] | None = None
+    status: Status = "measured"
+    reason: str | None = None
+
+    @classmethod
+    def of(cls, pose: RigidTransform, **fields: Any) -> "PoseEstimate":
+        return cls(R=pose.R.tolist(), t=pose.t.tolist(), **fields)
+
+    def to_transform(self) -> RigidTransform | None:
+        """Return the transform, or None where it could not be determined."""
+        return None if self.R is None or self.t is None else RigidTransform.of(self.R, self.t)
+
+
+class ProjectorEstimate(Record):
+    """Projector intrinsics."""
+
+    law: str
+    width: int | None = None
+    height: int | None = None
+    focal: Estimate
+    centre: Estimate
+    aspect: Estimate = Estimate(value=1.0, status="fixed")
+    distortion: Estimate = Estimate(value=[], status="fixed")
+
+    def to_model(self) -> ProjectorModel | None:
+        """Return the model, or None where a value could not be determined."""
+        values = [e.value for e in (self.focal, self.centre, self.aspect, self.distortion)]
+        if any(v is None for v in values):
+            return None
+        focal, centre, aspect, distortion = (np.asarray(v, float) for v in values)
+        return projector_model(
+            self.law, float(focal), [float(c) for c in centre], float(aspect),
+            [float(k) for k in distortion],
+        )  # fmt: skip
+
+
+class Frame(Record):
+    """One captured frame."""
+
+    name: str
+    projector_from_camera: PoseEstimate
+    world_from_camera: PoseEstimate
+    focal: Estimate | None = None
+    """Only where the focal length is per frame."""
+    rms_px: float | None = None
+    """Robust RMS of the residuals of the pixels used, pattern pixels."""
+    used: int | None = None
+    """Number of correspondences used."""
+    median_px: float | None = None
+    outliers: float | None = None
+    """Share of correspondences that the robust loss switched off."""
+    slips: int | None = None
+    """Correspondences found to be off by whole pattern periods."""
+
+
+class LeftOut(Record):
+    """A frame that is not part of the solution."""
+
+    name: str
+    reason: str
+
+
+class Solution(Record):
+    """Contents of ``solution.json`` and ``truth.json``."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True
+    )
+
+    schema_version: Literal[1] = Field(SCHEMA, alias="schema")
+    outcome: Outcome
+    units: Literal["mm", "baseline"]
+    """``baseline`` when the scale is unknown: lengths are multiples of the first baseline."""
+    scale: Literal["baseline", "known_distance", "up_to_scale", "truth"]
+    scale_std_percent: float = 0.0
+    """Standard deviation of the unit of length, which every metric value shares."""
+    verdict: list[str] = []
+    """What was measured and what was not, in words."""
+    warnings: list[str] = []
+    camera: Camera | None = None
+    projector: ProjectorEstimate
+    frames: list[Frame] = Field(min_length=1)
+    left_out: list[LeftOut] = []
+    surface: str | None = None
+    """File name of the surface beside this file, in the first camera's frame."""
+    noise_px: float | None = None
+    """Robust estimate of the noise of one projector coordinate, pattern pixels."""
+    law_evidence: dict[str, Any] = {}
+    observability: dict[str, Any] = {}
+    timings: dict[str, float] = {}
+    versions: dict[str, str] = {}
+    configuration: dict[str, Any] = {}
+
+
+def save_solution(path: str | Path, solution: Solution) -> None:
+    """Write a solution or truth file."""
+    text = solution.model_dump_json(by_alias=True, indent=1)
+    with atomic_path(path) as aside:
+        aside.write_text(text + "\n", encoding="utf-8")
+
+
+def load_solution(path: str | Path) -> Solution:
+    """Read a solution or truth file, or the one in a solution folder.
+
+    Raises:
+        InputError: names the file and field.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / ("solution.json" if (path / "solution.json").exists() else "truth.json")
+    return validate(Solution, read_json(path), path.name)
