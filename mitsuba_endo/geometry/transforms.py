@@ -76,6 +76,6 @@ def angle_between(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 def tangent_basis(direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (3, 2) orthonormal columns perpendicular to ``direction`` (3,)."""
     d = direction / np.linalg.norm(direction)
-    first = np.cross(d, np.eye(3)[np.argmin(np.abs(d))])
+    first = np.cross(d, np.eye(3)[np.argmin(np.abs(d))]).astype(np.float64)
     first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(d, first)])
+    return np.column_stack([first, np.cross(d, first)]).astype(np.float64)

@@ -26,7 +26,7 @@ class CorrespondenceMap:
     @property
     def valid(self) -> NDArray[np.bool_]:
         """(H, W) pixels that have a correspondence."""
-        return np.isfinite(self.q).all(-1)
+        return np.isfinite(self.q[..., 0]) & np.isfinite(self.q[..., 1])
 
 
 def load_map(path: str | Path) -> CorrespondenceMap:

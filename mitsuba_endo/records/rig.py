@@ -167,9 +167,9 @@ class KnownDistance(Record):
     pixels: Annotated[list[Vector2], Field(min_length=2, max_length=2)]
     """The two points, camera pixels."""
     mm: PositiveFloat
-    std: float = Field(0.0, ge=0)
+    std: float = Field(default=0.0, ge=0)
     """Standard deviation of ``mm``."""
-    frame: int = Field(0, ge=0)
+    frame: int = Field(default=0, ge=0)
     """Index of the frame."""
 
 
@@ -178,7 +178,7 @@ class Scale(Record):
 
     baseline: PositiveFloat | None = None
     """|t| of the first frame's projector_from_camera, mm."""
-    baseline_std: float = Field(0.0, ge=0)
+    baseline_std: float = Field(default=0.0, ge=0)
     """Standard deviation of ``baseline``, mm."""
     known_distance: KnownDistance | None = None
 

@@ -126,7 +126,7 @@ class Solution(Record):
         extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True
     )
 
-    schema_version: Literal[1] = Field(SCHEMA, alias="schema")
+    schema_version: Literal[1] = Field(default=SCHEMA, alias="schema")
     outcome: Outcome
     units: Literal["mm", "baseline"]
     """``baseline`` when the scale is unknown: lengths are multiples of the first baseline."""
