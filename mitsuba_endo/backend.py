@@ -79,12 +79,16 @@ def _wheel_library(stem: str) -> Path | None:
 
 
 def _preload_libcxx() -> None:
-    """Load the wheel's C++ runtime, whose symlinks a read-only environment never gets."""
+    """Load the wheel's C++ runtime, whose symlinks a read-only environment never gets.
+
+    Locally: made global, its unwinder would catch Mitsuba's exceptions and crash the process.
+    The loader finds a library that is already there by its name either way.
+    """
     for stem in ("libunwind", "libc++abi", "libc++"):
         library = _wheel_library(f"{stem}.so")
         if library is not None:
             try:
-                ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+                ctypes.CDLL(str(library), mode=ctypes.RTLD_LOCAL)
             except OSError:
                 return  # LLVM then says itself what it misses
 
