@@ -30,6 +30,12 @@ class CameraLaw(Protocol):
         self, coefficients: Sequence[Array], a: Array, b: Array
     ) -> tuple[Array, Array, Array]: ...
 
+    def density(
+        self, coefficients: Sequence[Array], x: Array, y: Array, z: Array
+    ) -> tuple[Array, Array]:
+        """Return |d(a, b) / d omega| and a mask: on the branch that ``direction`` inverts."""
+        ...
+
 
 CAMERAS: dict[str, CameraLaw] = {}
 
@@ -57,6 +63,16 @@ class OpenCVCamera:
     ) -> tuple[Array, Array, Array]:
         x, y = BrownDistortion(coefficients).remove(a, b)
         return x, y, 1 + 0 * x
+
+    def density(
+        self, coefficients: Sequence[Array], x: Array, y: Array, z: Array
+    ) -> tuple[Array, Array]:
+        xp = namespace(x, y, z)
+        brown = BrownDistortion(coefficients)
+        jxx, jxy, jyy = brown.jacobian(x / z, y / z)
+        cosine = z / xp.sqrt(x * x + y * y + z * z)
+        area = xp.abs(jxx * jyy - jxy * jxy) / (cosine * cosine * cosine)
+        return area, (z > 0) & brown.unfolded(x / z, y / z)
 
 
 @register_camera
@@ -87,6 +103,20 @@ class OpenCVFisheye:
         theta = FisheyeDistortion(coefficients).remove(theta_d)
         scale = xp.where(off_axis, xp.sin(theta) / theta_d, 1.0)
         return scale * a, scale * b, xp.where(off_axis, xp.cos(theta), 1.0)
+
+    def density(
+        self, coefficients: Sequence[Array], x: Array, y: Array, z: Array
+    ) -> tuple[Array, Array]:
+        """Area theta_d dtheta_d dphi over solid angle sin(theta) dtheta dphi."""
+        xp = namespace(x, y, z)
+        r2 = x * x + y * y
+        off_axis = r2 > 0
+        r = xp.sqrt(xp.where(off_axis, r2, 1.0))
+        theta = xp.atan2(r, z)
+        fisheye = FisheyeDistortion(coefficients)
+        slope = fisheye.slope(theta)
+        area = fisheye.apply(theta) * slope * xp.sqrt(r2 + z * z) / r
+        return xp.where(off_axis, area, 1.0), xp.where(off_axis, slope > 0, z > 0)
 
 
 @dataclass(frozen=True, eq=False)

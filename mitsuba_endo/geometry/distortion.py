@@ -78,6 +78,15 @@ class BrownDistortion:
             g + 2 * (y * y * dg + 3 * p1 * y + p2 * x),
         )
 
+    def unfolded(self, x: Array, y: Array) -> Array:
+        """Return a mask of ideal points on the branch that :meth:`remove` inverts.
+
+        Far outside the image strong barrel distortion folds the plane back into it; there the
+        Jacobian is not positive definite.
+        """
+        jxx, jxy, jyy = self.jacobian(x, y)
+        return (jxx * jyy - jxy * jxy > 0) & (jxx + jyy > 0)
+
     def _newton(
         self, model: "BrownDistortion", a: Array, b: Array, xt: Array, yt: Array
     ) -> tuple[Array, Array]:
@@ -116,11 +125,12 @@ class FisheyeDistortion:
         target = xp.detach(theta_d)
         theta = target
         for _ in range(_FIXED_POINT_STEPS + _NEWTON_STEPS):
-            theta = theta - (frozen.apply(theta) - target) / frozen._slope(theta)
+            theta = theta - (frozen.apply(theta) - target) / frozen.slope(theta)
         theta = xp.detach(theta)
-        return theta - (self.apply(theta) - theta_d) / frozen._slope(theta)
+        return theta - (self.apply(theta) - theta_d) / frozen.slope(theta)
 
-    def _slope(self, theta: Array) -> Array:
+    def slope(self, theta: Array) -> Array:
+        """Return d theta_d / d theta."""
         k1, k2, k3, k4 = self._padded()
         t2 = theta * theta
         return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
