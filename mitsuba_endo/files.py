@@ -24,6 +24,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     # Plain open() under the user's umask: mkstemp would leave the file readable by its owner only.
     aside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
     try:
+        # Not every writer (OpenEXR) reports a folder it may not write to as an OSError.
+        aside.touch()
         yield aside
         os.replace(aside, path)
     except OSError as error:
@@ -42,7 +44,7 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
     Raises:
         InputError: ``path`` is a file, a folder that holds foreign files, or cannot be written.
     """
-    path = Path(path)
+    path = Path(path).absolute()
     check_output_folder(path)
     _make_parent(path)
     try:
@@ -95,8 +97,9 @@ def _swap(aside: Path, path: Path) -> None:
     os.replace(path, old)
     try:
         os.replace(aside, path)
-    except OSError:
-        os.replace(old, path)
+    except BaseException:  # Ctrl-C between the two renames must not lose the older result
+        if not path.exists():
+            os.replace(old, path)
         raise
     shutil.rmtree(old, ignore_errors=True)
 

@@ -1,5 +1,7 @@
 """Correspondence maps: for each camera pixel the projector coordinate it sees."""
 
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,31 +40,41 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     path = Path(path)
     if not path.is_file():
         raise InputError("no such file", str(path), "check the path")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"unknown kind of map '{path.suffix}'", str(path), "give an .exr or .npz file"
-        )
+    _check_suffix(path)
     q = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
     _check(q, str(path))
     return CorrespondenceMap(np.where(np.isfinite(q).all(-1, keepdims=True), q, np.nan), path.name)
 
 
 def save_map(path: str | Path, q: NDArray[np.floating]) -> None:
-    """Write an (H, W, 2) map as OpenEXR or npz, by the suffix of ``path``."""
+    """Write an (H, W, 2) map as OpenEXR or npz, by the suffix of ``path``.
+
+    Raises:
+        InputError: another suffix, or the folder cannot be written.
+    """
+    _check_suffix(Path(path))
     q = np.ascontiguousarray(q, dtype=np.float32)
     if Path(path).suffix.lower() == ".npz":
-        with atomic_path(path) as aside:
-            np.savez_compressed(aside, map=q)
+        # An open file, because NumPy appends its own suffix to names that end in .NPZ.
+        with atomic_path(path) as aside, aside.open("wb") as file:
+            np.savez_compressed(file, map=q)
         return
     write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)})
 
 
 def write_exr(path: str | Path, channels: dict[str, NDArray[np.floating]]) -> None:
-    """Write (H, W) channels as a float32 OpenEXR file."""
+    """Write (H, W) channels as a float32 OpenEXR file.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     arrays = {k: np.ascontiguousarray(v, dtype=np.float32) for k, v in channels.items()}
     with atomic_path(path) as aside:
-        OpenEXR.File(header, arrays).write(str(aside))
+        try:
+            OpenEXR.File(header, arrays).write(str(aside))
+        except RuntimeError as error:  # how OpenEXR reports a full disk
+            raise OSError(str(error)) from error
 
 
 def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
@@ -80,6 +92,13 @@ def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
         raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
 
 
+def _check_suffix(path: Path) -> None:
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"unknown kind of map '{path.suffix}'", str(path), "give an .exr or .npz file"
+        )
+
+
 def _read_exr(path: Path) -> NDArray[np.float32]:
     channels = read_exr(path)
     missing = [name for name in CHANNELS if name not in channels]
@@ -92,13 +111,16 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
 
 def _read_npz(path: Path) -> NDArray[np.float32]:
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file:  # NumPy itself leaves a damaged file open
+            data = np.load(file, allow_pickle=False)
+            if not isinstance(data, np.lib.npyio.NpzFile):
+                raise InputError("is an array, not an npz file", str(path), "use numpy.savez")
             if "map" not in data:
                 raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
             q = np.asarray(data["map"])
-    except (ValueError, OSError, EOFError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
         raise InputError("is not a readable npz file", str(path), "make it again") from None
     if q.ndim != 3 or q.shape[2] != 2 or q.dtype.kind not in "fiu":
         raise InputError(

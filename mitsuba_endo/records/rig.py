@@ -1,5 +1,6 @@
 """The rig file: what is known of camera and projector, and what is to be found."""
 
+import contextlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -100,6 +101,17 @@ class Pose(Record):
     R: Matrix3 | Vector3
     t: Vector3
 
+    @field_validator("R", mode="before")
+    @classmethod
+    def _shape(cls, value: Any) -> Any:
+        try:
+            R = np.asarray(value, float)
+        except (TypeError, ValueError):
+            R = np.empty(0)
+        if R.shape not in ((3, 3), (3,)) or not np.isfinite(R).all():
+            raise ValueError("is neither 3x3 nor three finite numbers; give a matrix or a vector")
+        return value
+
     @field_validator("R")
     @classmethod
     def _rotation(cls, value: Any) -> Any:
@@ -144,6 +156,9 @@ class Projector(Record):
     @field_validator("focal", mode="before")
     @classmethod
     def _number_is_fixed(cls, value: Any) -> Any:
+        if isinstance(value, str):  # YAML 1.1 reads 1e3, without a point, as text
+            with contextlib.suppress(ValueError):
+                value = float(value)
         if isinstance(value, int | float) and not isinstance(value, bool):
             return {"value": value, "refine": False}
         return value
@@ -255,7 +270,7 @@ def load_rig(path: str | Path) -> Rig:
     return validate(Rig, data, path.name)
 
 
-def _opencv_camera(path: Path) -> dict[str, Any]:
+def _opencv_camera(path: Path) -> Camera:
     """Read the camera part from a file written by OpenCV's calibration tools."""
     if not path.is_file():
         raise InputError("no such file", str(path), "check `camera` in the rig file")
@@ -275,13 +290,16 @@ def _opencv_camera(path: Path) -> dict[str, Any]:
             raise InputError("image_width or image_height is missing", str(path), "add them")
         fisheye = storage.getNode("fisheye_model")
         is_fisheye = not fisheye.empty() and bool(fisheye.real())
-        return {
+        data = {
             "model": "opencv_fisheye" if is_fisheye else "opencv",
             "width": int(width.real()), "height": int(height.real()), "K": K.tolist(),
             "distortion": [] if d is None else d.ravel().tolist(),
         }  # fmt: skip
+    except cv2.error:
+        raise InputError("is not an OpenCV calibration", str(path), "check the file") from None
     finally:
         storage.release()
+    return validate(Camera, data, path.name)
 
 
 def _first_node(storage: cv2.FileStorage, names: tuple[str, ...]) -> np.ndarray | None:

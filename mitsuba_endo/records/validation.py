@@ -105,6 +105,9 @@ def _explain(
     if kind == "value_error":
         what, _, todo = str(error["ctx"]["error"]).partition("; ")
         return what, field, todo or "mend the value"
+    if kind == "model_type":
+        keys = ", ".join(_keys_at(model, path))
+        return f"is not a mapping, got {given!r}", field, f"the keys are {keys}"
     message = error["msg"][0].lower() + error["msg"][1:]
     return f"{message}, got {given!r}", field, "mend the value"
 
