@@ -125,7 +125,7 @@ class Endoscope:
         return [getattr(self, name) for name in COEFFICIENTS[self.model]]
 
     def _local_direction(self, u: Any, v: Any) -> Any:
-        """Return the unit direction of pixels in Mitsuba's sensor frame; NaN where there is none."""
+        """Return the unit direction of pixels in Mitsuba's sensor frame; NaN where none exists."""
         a, b = (u - self.cx) / self.fx, (v - self.cy) / self.fy
         local = swap_axes(CAMERAS[self.model].direction(self.distortion(), a, b))
         return dr.normalize(mi.Vector3f(*(mi.Float(c) for c in local)))

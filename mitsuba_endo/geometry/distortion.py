@@ -12,6 +12,7 @@ from .arrays import Array, namespace
 
 _FIXED_POINT_STEPS = 8
 _NEWTON_STEPS = 6
+_MIN_MAGNIFICATION = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +31,9 @@ class BrownDistortion:
         """Distort ideal normalised coordinates."""
         if not len(self.coefficients):
             return x, y
-        k1, k2, p1, p2, k3, k4, k5, k6 = self._padded()
+        _, _, p1, p2, *_ = self._padded()
         r2 = x * x + y * y
-        g = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        g = self._magnification(x, y)
         return (
             g * x + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
             g * y + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
@@ -53,8 +54,10 @@ class BrownDistortion:
         a, b = xt, yt
         for _ in range(_FIXED_POINT_STEPS):
             da, db = frozen.apply(a, b)
-            # Half steps: full ones oscillate under strong barrel distortion.
-            a, b = a + 0.5 * (xt - da), b + 0.5 * (yt - db)
+            # Divided by the local magnification and halved, a step contracts up to the fold of
+            # barrel distortion and for pincushion distortion of any strength.
+            step = 0.5 / xp.maximum(frozen._magnification(a, b), _MIN_MAGNIFICATION)
+            a, b = a + step * (xt - da), b + step * (yt - db)
         for _ in range(_NEWTON_STEPS):
             a, b = frozen._newton(frozen, a, b, xt, yt)
         return frozen._newton(self, xp.detach(a), xp.detach(b), x, y)
@@ -86,6 +89,12 @@ class BrownDistortion:
         """
         jxx, jxy, jyy = self.jacobian(x, y)
         return (jxx * jyy - jxy * jxy > 0) & (jxx + jyy > 0)
+
+    def _magnification(self, x: Array, y: Array) -> Array:
+        """Return g, the radial factor."""
+        k1, k2, _, _, k3, k4, k5, k6 = self._padded()
+        r2 = x * x + y * y
+        return (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
 
     def _newton(
         self, model: "BrownDistortion", a: Array, b: Array, xt: Array, yt: Array
