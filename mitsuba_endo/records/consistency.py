@@ -1,0 +1,89 @@
+"""Whether correspondence maps and a rig belong together, asked before any work is done."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from .correspondence import CorrespondenceMap
+from .rig import Rig
+
+MIN_CORRESPONDENCES = 50
+"""With fewer, the pose, the focal length and a surface cannot be told from noise."""
+MIN_SHARE_ON_PATTERN = 0.5
+"""Outliers and a wrong centre leave more than this on the pattern; wrong units do not."""
+
+
+def check_maps(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
+    """Refuse maps that cannot belong to the rig.
+
+    Raises:
+        InputError: no map, two frames of one name, map and camera of different size, fewer than
+            50 correspondences, coordinates mostly outside the pattern, or a known distance
+            between points that are not in the maps; names the map and the rig's field.
+    """
+    if not maps:
+        raise InputError("no correspondence map is given", todo="give at least one")
+    names = [map_.name for map_ in maps]
+    twice = [name for name in dict.fromkeys(names) if names.count(name) > 1]
+    if twice:
+        raise InputError("two frames have this name", twice[0], "rename one file")
+    for map_ in maps:
+        _check_size(map_, rig)
+        _check_count(map_)
+        _check_units(map_, rig)
+    _check_known_distance(maps, rig)
+
+
+def _check_size(map_: CorrespondenceMap, rig: Rig) -> None:
+    height, width = map_.q.shape[:2]
+    if (width, height) != (rig.camera.width, rig.camera.height):
+        raise InputError(
+            f"the map is {width} x {height} pixels and the rig's camera.width x camera.height "
+            f"{rig.camera.width} x {rig.camera.height}",
+            f"{map_.name}: map",
+            "give the camera of the images that the map was made from",
+        )
+
+
+def _check_count(map_: CorrespondenceMap) -> None:
+    count = int(map_.valid.sum())
+    if count < MIN_CORRESPONDENCES:
+        raise InputError(
+            f"the map has {count} usable correspondences, fewer than {MIN_CORRESPONDENCES}",
+            f"{map_.name}: map",
+            "check how it was decoded",
+        )
+
+
+def _check_units(map_: CorrespondenceMap, rig: Rig) -> None:
+    q = map_.q[map_.valid]
+    size = np.array([rig.projector.width, rig.projector.height])
+    share = ((q >= -0.5) & (q <= size - 0.5)).all(-1).mean()
+    if share < MIN_SHARE_ON_PATTERN:
+        raise InputError(
+            f"only {100 * share:.0f} % of the projector coordinates lie on the pattern of "
+            f"projector.width x projector.height = {size[0]} x {size[1]} pixels",
+            f"{map_.name}: map",
+            "give coordinates in pattern pixels and the pattern's size in the rig",
+        )
+
+
+def _check_known_distance(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
+    known = rig.scale.known_distance
+    if known is None:
+        return
+    if known.frame >= len(maps):
+        raise InputError(
+            f"frame {known.frame} does not exist, {len(maps)} maps are given and counted from 0",
+            "scale.known_distance.frame",
+            "name a frame that is given",
+        )
+    limits = np.array([rig.camera.width, rig.camera.height]) - 0.5
+    pixels = np.array(known.pixels)
+    if not ((pixels >= -0.5) & (pixels <= limits)).all():
+        raise InputError(
+            f"the points {known.pixels} do not both lie in the camera's image",
+            "scale.known_distance.pixels",
+            "give two (x, y) in camera pixels",
+        )
