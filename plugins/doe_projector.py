@@ -8,7 +8,7 @@ import mitsuba as mi
 from mitsuba_endo.geometry.laws import LAWS, ProjectorModel, projector_model
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
 
-from .variants import make_opaque, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_to_world, variant_class
 
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 _MIN_COSINE = 0.01  # directions beyond 89.4 degrees would overflow the distortion's polynomials
@@ -169,7 +169,12 @@ class DoeProjector:
         model = self.model()
         u, v = model.project_xyz(x, y, z)
         unfolded = model.distortion.unfolded(*LAWS[self.law].normalise(x, y, z))
-        return mi.Float(u), mi.Float(v), mi.Float(model.density_xyz(x, y, z)), front & unfolded
+        return (
+            mi.Float(u),
+            mi.Float(v),
+            mi.Float(model.density_xyz(x, y, z)),
+            mi.Bool(front & unfolded),
+        )
 
     def inside(self, u: Any, v: Any) -> Any:
         """Return the mask of coordinates on the pattern, half a pixel around its pixel centres."""
@@ -195,18 +200,14 @@ class DoeProjector:
 
     def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
         intensity, uv, active = self._incident(it.p, it.wavelengths, active)
-        ds = dr.zeros(mi.DirectionSample3f)
-        ds.p = self.to_world.translation()
-        ds.n = self.to_world @ mi.Vector3f(0, 0, 1)
-        ds.uv = uv
-        ds.time = it.time
-        ds.pdf = 1.0
-        ds.delta = True
-        ds.emitter = mi.EmitterPtr(self)
-        towards = ds.p - it.p
+        origin = self.to_world.translation()
+        towards = origin - it.p
         squared = dr.select(active, dr.squared_norm(towards), 1.0)
-        ds.dist = dr.sqrt(squared)
-        ds.d = towards / ds.dist
+        distance = dr.sqrt(squared)
+        normal = mi.Normal3f(self.to_world @ mi.Vector3f(0, 0, 1))
+        ds = mi.DirectionSample3f(
+            origin, normal, uv, it.time, 1.0, True, towards / distance, distance, pointer_to(self)
+        )
         return ds, mi.depolarizer(intensity / squared) & active
 
     def eval_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
@@ -229,11 +230,8 @@ class DoeProjector:
         wavelengths, weight = self.sample_wavelengths(si, sample1, active)
         direction, emitted = self._direction(uv)
         active = active & emitted & (pdf > 0)
-        ray = dr.zeros(mi.Ray3f)
-        ray.time, ray.wavelengths = time, wavelengths
-        ray.maxt = dr.largest(mi.Float)
-        ray.o = self.to_world.translation()
-        ray.d = self.to_world @ direction
+        origin = self.to_world.translation()
+        ray = mi.Ray3f(origin, self.to_world @ direction, time, wavelengths)
         weight *= self.width * self.height / dr.select(active, pdf, 1.0)
         return ray, mi.depolarizer(dr.select(active, weight, 0.0))
 
@@ -247,7 +245,7 @@ class DoeProjector:
         u2, v2 = model.project_xyz(x, y, z)  # does not return where no direction reaches (u, v)
         valid &= (abs(u2 - u) < _ROUND_TRIP_PX) & (abs(v2 - v) < _ROUND_TRIP_PX)
         local = mi.Vector3f(*(mi.Float(c) for c in swap_axes((x, y, z))))
-        return dr.normalize(dr.select(valid, local, mi.Vector3f(0, 0, 1))), valid
+        return dr.normalize(local), mi.Bool(valid)
 
     def sample_wavelengths(self, si: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
         if mi.is_spectral:

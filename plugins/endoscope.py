@@ -8,7 +8,7 @@ import mitsuba as mi
 from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
 
-from .variants import make_opaque, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_to_world, variant_class
 
 COEFFICIENTS = {
     "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
@@ -187,17 +187,22 @@ class Endoscope:
 
     def sample_direction(self, it: Any, sample: Any, active: Any = True) -> tuple[Any, Any]:
         importance, position, active = self._importance(it.p, active)
-        ds = dr.zeros(mi.DirectionSample3f)
-        ds.uv = position
-        ds.p = self.to_world.translation()
-        ds.n = self.to_world @ mi.Vector3f(0, 0, 1)
-        ds.time = it.time
-        ds.pdf = 1.0
-        ds.delta = True
-        towards = ds.p - it.p
+        origin = self.to_world.translation()
+        towards = origin - it.p
         squared = dr.select(active, dr.squared_norm(towards), 1.0)
-        ds.dist = dr.sqrt(squared)
-        ds.d = towards / ds.dist
+        distance = dr.sqrt(squared)
+        normal = mi.Normal3f(self.to_world @ mi.Vector3f(0, 0, 1))
+        ds = mi.DirectionSample3f(
+            origin,
+            normal,
+            position,
+            it.time,
+            1.0,
+            True,
+            towards / distance,
+            distance,
+            pointer_to(None),
+        )
         return ds, mi.Spectrum(importance / squared)
 
     def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:

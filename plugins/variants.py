@@ -43,3 +43,8 @@ def make_opaque(*values: Any) -> None:
         import drjit as dr
 
         dr.make_opaque(*values)
+
+
+def pointer_to(emitter: Any) -> Any:
+    """Return what a direction sample stores to name its emitter, None for a sensor's."""
+    return emitter if mi.variant().startswith("scalar") else mi.EmitterPtr(emitter)
