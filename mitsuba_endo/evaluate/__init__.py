@@ -1,0 +1,1 @@
+"""Comparison of a solution with the truth."""
