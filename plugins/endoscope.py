@@ -2,13 +2,10 @@
 
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
-
 from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
 
-from .variants import make_opaque, pointer_to, read_to_world, variant_class
+from .variants import dr, make_opaque, mi, pointer_to, read_to_world, variant_class
 
 COEFFICIENTS = {
     "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
@@ -84,6 +81,8 @@ class Endoscope:
             'k1': -0.25,
             'film': {'type': 'hdrfilm', 'width': 480, 'height': 360},
     """
+
+    film: Any  # of mi.Sensor
 
     def __init__(self, props: Any) -> None:
         mi.Sensor.__init__(self, props)

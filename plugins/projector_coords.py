@@ -2,14 +2,11 @@
 
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
-
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.rendering.axes import fraction_from_pixel, swap_axes
 
 from . import doe_projector
-from .variants import variant_class
+from .variants import dr, is_scalar, mi, variant_class
 
 CHANNELS = ("projector.x", "projector.y", "depth", "visible", "camera")
 
@@ -93,7 +90,7 @@ class ProjectorCoords:
             dr.traverse(dr.ADMode.Backward)
 
     def _image(self, scene: Any, sensor: Any) -> Any:
-        if mi.variant().startswith("scalar"):
+        if is_scalar():
             raise RuntimeError("projector_coords needs a vectorised variant, such as llvm_ad_rgb")
         sensor = scene.sensors()[sensor] if isinstance(sensor, int) else sensor
         projector = find_projector(scene, self.projector)

@@ -7,10 +7,15 @@ written as a plain template whose members are copied onto the base of the active
 import functools
 from typing import Any
 
-import mitsuba as mi
+import drjit
+import mitsuba
 import numpy as np
 
 from mitsuba_endo.rendering.axes import is_rigid
+
+# Their members depend on the active variant, so they have no static types.
+dr: Any = drjit
+mi: Any = mitsuba
 
 _NOT_COPIED = ("__dict__", "__weakref__")
 
@@ -39,12 +44,15 @@ def read_to_world(props: Any) -> Any:
 
 def make_opaque(*values: Any) -> None:
     """Keep parameters out of the generated code, so that changing them compiles nothing anew."""
-    if not mi.variant().startswith("scalar"):
-        import drjit as dr
-
+    if not is_scalar():
         dr.make_opaque(*values)
 
 
 def pointer_to(emitter: Any) -> Any:
     """Return what a direction sample stores to name its emitter, None for a sensor's."""
-    return emitter if mi.variant().startswith("scalar") else mi.EmitterPtr(emitter)
+    return emitter if is_scalar() else mi.EmitterPtr(emitter)
+
+
+def is_scalar() -> bool:
+    """Tell whether the active variant computes one value at a time."""
+    return mi.variant().startswith("scalar")
