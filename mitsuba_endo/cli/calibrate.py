@@ -1,0 +1,154 @@
+"""``mitsuba-endo calibrate``: from correspondence maps to a solution folder."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
+
+if TYPE_CHECKING:
+    from ..records.calibration import Calibration
+    from ..records.correspondence import CorrespondenceMap
+    from ..records.rig import Rig
+    from ..solve.options import Options
+
+Maps = Annotated[
+    list[Path],
+    typer.Argument(metavar="MAP", help="Correspondence maps, .exr or .npz, one per frame."),
+]
+RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: what is known and what is not.")]
+Out = Annotated[Path, typer.Option("--out", help="Solution folder to write.")]
+Solver = Annotated[
+    Literal["gauss-newton", "adam"],
+    typer.Option(help="Gauss-Newton, or the published first-order method."),
+]
+Start = Annotated[
+    Literal["search", "plane"],
+    typer.Option(help="Search for a start, or the published plane and front-parallel projector."),
+]
+Share = Annotated[
+    str | None,
+    typer.Option(
+        metavar="BLOCK=MODE,...",
+        help="Replace entries of the rig's sharing plan, e.g. surface=per_frame,focal=fixed.",
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the random samples in the search.")]
+
+
+def calibrate(
+    maps: Maps,
+    rig: RigFile,
+    out: Out,
+    solver: Solver = "gauss-newton",
+    start: Start = "search",
+    share: Share = None,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Find projector pose, focal length and surface from correspondence maps."""
+    with session(quiet, as_json, debug) as output:
+        from ..files import check_output_folder
+        from ..solve.options import Options
+
+        check_output_folder(out)
+        frames, rig_record = load_input(maps, rig, share)
+        options = Options(solver=solver, start=start, seed=seed)
+        result = solve_and_write(frames, rig_record, options, out, output)
+        report(result, out, output)
+        raise typer.Exit(exit_code(result))
+
+
+def load_input(
+    paths: list[Path], rig_file: Path, share: str | None = None
+) -> tuple[list["CorrespondenceMap"], "Rig"]:
+    """Read and check everything that a calibration starts from.
+
+    Raises:
+        InputError: a file is missing or wrong, or the maps do not belong to the rig.
+    """
+    from ..records.consistency import check_maps
+    from ..records.rig import load_rig
+
+    rig = load_rig(rig_file)
+    if share:
+        rig = with_sharing(rig, share)
+    maps = _load_maps(paths)
+    check_maps(maps, rig)
+    return maps, rig
+
+
+def _load_maps(paths: list[Path]) -> list["CorrespondenceMap"]:
+    """Read maps, calling files of one name in several folders by folder and name."""
+    from dataclasses import replace
+
+    from ..records.correspondence import load_map
+
+    names = [path.name for path in paths]
+    return [
+        replace(map_, name=f"{path.absolute().parent.name}/{path.name}")
+        if names.count(path.name) > 1
+        else map_
+        for path, map_ in ((path, load_map(path)) for path in paths)
+    ]
+
+
+def with_sharing(rig: "Rig", text: str) -> "Rig":
+    """Return the rig with entries of its sharing plan replaced, e.g. ``focal=fixed,centre=shared``.
+
+    Raises:
+        InputError: not of the form block=mode, or an unknown block or mode.
+    """
+    from ..errors import InputError
+    from ..records.rig import Share
+    from ..records.validation import validate
+
+    plan = rig.share.model_dump()
+    for item in text.split(","):
+        block, equals, mode = (part.strip() for part in item.partition("="))
+        if not equals:
+            raise InputError(f"'{item}' is not block=mode", "--share", "e.g. surface=per_frame")
+        plan[block] = mode
+    return rig.model_copy(update={"share": validate(Share, plan, "--share")})
+
+
+def solve_and_write(
+    maps: list["CorrespondenceMap"], rig: "Rig", options: "Options", out: Path, output: Session
+) -> "Calibration":
+    """Calibrate with a progress bar and write the solution folder."""
+    from ..show.solution_folder import write_solution_folder
+    from ..solve.calibrate import calibrate as solve
+
+    with output.progress("Starting Mitsuba") as advance:
+        from .. import backend
+
+        backend.use()
+        result = solve(maps, rig, options, advance)
+        advance(1.0, "Writing pictures")
+        write_solution_folder(out, result)
+    return result
+
+
+def exit_code(result: "Calibration") -> int:
+    """0 if the calibration converged, 130 if the user stopped it, else 1."""
+    from ..records.solution import Outcome
+
+    special = {Outcome.CONVERGED: 0, Outcome.INTERRUPTED: EXIT_INTERRUPTED}
+    return special.get(result.solution.outcome, EXIT_FAULT)
+
+
+def report(result: "Calibration", out: Path, output: Session) -> None:
+    """Print what was found."""
+    from .summary import solution_table
+
+    solution = result.solution
+    output.print(solution_table(solution), *solution.verdict)
+    for warning in solution.warnings:
+        output.print(f"warning: {warning}")
+    output.print(f"Outcome: {solution.outcome}. Look at {out}/residual.png first.")
+    output.summary(
+        {"folder": str(out), "solution": solution.model_dump(mode="json", by_alias=True)}
+    )

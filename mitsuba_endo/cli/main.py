@@ -1,0 +1,47 @@
+"""Entry point of ``mitsuba-endo``."""
+
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+from .calibrate import calibrate
+from .doctor import doctor
+from .evaluate import evaluate
+
+app = typer.Typer(
+    name="mitsuba-endo",
+    help="Calibrate camera-projector pairs and 3D endoscopes without a target.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+for command in (doctor, calibrate, evaluate):
+    app.command()(command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback(
+    epilog="Exit codes: 0 done, 1 not converged or a fault found, 2 bad input, "
+    "3 no pattern found, 70 internal error, 130 interrupted."
+)
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+if __name__ == "__main__":
+    main()
