@@ -1,0 +1,54 @@
+# Everything from a fresh checkout with only python3 (3.11 to 3.13, with venv) and make.
+# A stamp in the environment keeps a second run from installing again.
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/.stamps
+
+.PHONY: help demo test test-slow lint format benchmark clean
+
+help:
+	@echo "make demo       install into $(VENV) and calibrate a synthetic endoscope (demo-output/)"
+	@echo "make test       run the tests"
+	@echo "make test-slow  run the experiments of minutes too"
+	@echo "make lint       ruff and pyright"
+	@echo "make format     let ruff mend the layout"
+	@echo "make benchmark  compare with pycolmap and the published solver (benchmark-output/)"
+
+demo: $(STAMPS)/core
+	$(BIN)/mitsuba-endo demo --out demo-output
+
+test: $(STAMPS)/test
+	$(BIN)/python -m pytest
+
+test-slow: $(STAMPS)/test
+	$(BIN)/python -m pytest -m "slow or not slow"
+
+lint: $(STAMPS)/lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+format: $(STAMPS)/lint
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+benchmark: $(STAMPS)/benchmark
+	$(BIN)/python scripts/benchmark.py --out benchmark-output
+
+clean:
+	rm -rf $(VENV) build *.egg-info demo-output benchmark-output
+
+$(STAMPS)/venv:
+	$(PYTHON) -m venv $(VENV)
+	mkdir -p $(STAMPS)
+	touch $@
+
+$(STAMPS)/core: $(STAMPS)/venv pyproject.toml
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/benchmark: $(STAMPS)/%: $(STAMPS)/core
+	$(BIN)/python -m pip install --quiet --editable ".[$*]"
+	touch $@
