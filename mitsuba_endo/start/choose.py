@@ -1,0 +1,210 @@
+"""Refinement of proposals to minima of the epipolar cost, and the choice among them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
+
+from .correspondences import Correspondences
+from .propose import facing, planar_poses, same_pose
+from .refine import Loss, State, evaluate, minimise
+from .result import Candidate
+
+GRADUATED_PX = (20.0, 5.0, 1.0)
+"""Cauchy scales, coarse to fine: a wide one bridges wrong starts, a narrow one ignores outliers."""
+REDESCENDING = 2.0
+"""Geman-McClure scale of the finish over the robust residual scale: a Cauchy loss alone leaves
+-0.3 to -0.5 % in f under 30 % outliers."""
+MIN_IN_FRONT = 0.99
+MIN_SCALE_PX = 0.02
+EXPLAINED = 1.5
+"""Residuals within this many times the map's own noise are explained."""
+HOPELESS = 4.0
+"""Times the cost of a state that explains the data: not refined further."""
+FINALISTS = 3
+SIMILAR_COST = 1.2
+"""Minima whose costs have at most this ratio are reported as a possible confusion."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What stays the same over all candidates."""
+
+    projector: ProjectorModel
+    refine_focal: bool
+    focal_bounds: tuple[float, float]
+    noise_px: float
+    """Noise of q as the map itself shows it, pattern pixels (see ``clean.noise_scale``)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """A calibration at a minimum of the cost on some sample."""
+
+    state: State
+    in_front: float
+    """Share of points not behind camera or projector."""
+    cost: float = np.inf
+    """See :class:`.result.Candidate`."""
+
+    @property
+    def candidate(self) -> Candidate:
+        return Candidate(
+            self.state.pose, float(self.state.projector.focal), self.cost, self.in_front
+        )
+
+
+def robust_scale(state: State) -> float:
+    """Return 1.4826 times the median absolute residual, pattern pixels."""
+    return max(MIN_SCALE_PX, 1.4826 * float(np.median(np.abs(state.r))))
+
+
+def refine(
+    problem: Problem, starts: Iterable[tuple[RigidTransform, float]], data: Correspondences
+) -> list[Minimum]:
+    """Descend from every (pose, focal) under the graduated and then the redescending loss.
+
+    Starts that have run into one another go on as one. The planar twin of the best minimum
+    competes as well: on nearly planar data it fits about as well.
+
+    Returns:
+        The distinct minima with at least 99 % of the points in front, best first.
+    """
+    states = [evaluate(pose, problem.projector.with_(focal=focal), data) for pose, focal in starts]
+    states = _graduated(problem, states, data, GRADUATED_PX)
+    minima = _valid([_redescend(problem, s, data) for s in states], data)
+    if not minima:
+        return []
+    best = minima[0].state
+    twins = _graduated(problem, _twins(best, data), data, GRADUATED_PX[1:], rival=best)
+    redescended = [_redescend(problem, s, data) for s in twins]
+    return ranked([*minima, *_valid(redescended, data)])
+
+
+def finish(problem: Problem, minima: list[Minimum], data: Correspondences) -> list[Minimum]:
+    """Finish the best minimum, and those of similar cost, on a larger sample."""
+    limit = SIMILAR_COST * minima[0].cost
+    close = [m for m in minima[:FINALISTS] if m.cost <= limit]
+    finished = [_redescend(problem, _on(m.state, data), data) for m in close]
+    return [*_valid(finished, data), *minima[len(close) :]]
+
+
+def _graduated(
+    problem: Problem,
+    states: list[State],
+    data: Correspondences,
+    scales: tuple[float, ...],
+    rival: State | None = None,
+) -> list[State]:
+    """Descend from all states through the Cauchy scales; merge and drop between the scales."""
+    rivals = [] if rival is None else [rival]
+    for scale in scales:
+        loss = Loss(False, scale)
+        states = [_descend(problem, s, data, loss) for s in states]
+        states = _without_repeats(sorted(states, key=lambda s: loss.cost(s.r)))
+        states = _competitive(problem, states, [*states, *rivals], loss)
+    return states
+
+
+def _competitive(
+    problem: Problem, states: list[State], field: list[State], loss: Loss
+) -> list[State]:
+    """Drop hopeless states, but only once some state of ``field`` explains the data to the noise.
+
+    Until then a high cost may just mean a long way to go.
+    """
+    costs = {id(s): loss.cost(s.r) for s in field}
+    best = min(field, key=lambda s: costs[id(s)], default=None)
+    if best is None or robust_scale(best) > EXPLAINED * problem.noise_px:
+        return states
+    return [s for s in states if costs[id(s)] <= HOPELESS * costs[id(best)]]
+
+
+def _twins(best: State, data: Correspondences) -> list[State]:
+    noise_angle = robust_scale(best) / best.projector.focal
+    poses = [
+        facing(pose, data, best.seen, noise_angle)[0]
+        for pose in planar_poses(data, best.seen, 4 * noise_angle)
+    ]
+    return [
+        evaluate(pose, best.projector, data, best.seen)
+        for pose in poses
+        if not same_pose(pose, best.pose, 0.03)
+    ]
+
+
+def _valid(states: list[State], data: Correspondences) -> list[Minimum]:
+    minima = [_turned_to_front(s, data) for s in states]
+    return ranked([m for m in minima if m.in_front >= MIN_IN_FRONT])
+
+
+def _without_repeats(states: list[State]) -> list[State]:
+    kept: list[State] = []
+    for s in states:
+        if not any(_same(s, k) for k in kept):
+            kept.append(s)
+    return kept
+
+
+def ranked(minima: list[Minimum]) -> list[Minimum]:
+    """Return the distinct minima by cost under one Geman-McClure loss, that of the best scale.
+
+    Costs that noise alone could put in either order (a chi-square difference below 9) are a tie;
+    among those the smaller rotation comes first, since projectors look where their cameras do.
+    """
+    if not minima:
+        return []
+    scale = min(robust_scale(m.state) for m in minima)
+    loss = Loss(True, REDESCENDING * scale)
+    rated = sorted(
+        (Minimum(m.state, m.in_front, loss.cost(m.state.r) / scale**2) for m in minima),
+        key=lambda m: m.cost,
+    )
+    distinct = _without_repeats([m.state for m in rated])
+    kept = [m for m in rated if any(m.state is s for s in distinct)]
+    tie = kept[0].cost + 4.5 / kept[0].state.r.size
+    return sorted(
+        kept,
+        key=lambda m: (m.cost > tie, rotation_angle(m.state.pose.R) if m.cost <= tie else m.cost),
+    )
+
+
+def _descend(problem: Problem, state: State, data: Correspondences, loss: Loss) -> State:
+    return minimise(
+        state, data, loss,
+        refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds,
+    )  # fmt: skip
+
+
+def _redescend(problem: Problem, state: State, data: Correspondences) -> State:
+    """Alternate the residual scale and the minimum under it until the scale stays."""
+    for _ in range(4):
+        scale = robust_scale(state)
+        state = _descend(problem, state, data, Loss(True, REDESCENDING * scale))
+        if abs(robust_scale(state) - scale) < 0.02 * scale:
+            break
+    return state
+
+
+def _on(state: State, data: Correspondences) -> State:
+    return evaluate(state.pose, state.projector, data)
+
+
+def _turned_to_front(state: State, data: Correspondences) -> Minimum:
+    """Return the minimum with the sign of t, which the residual does not feel, set by depth."""
+    scale = robust_scale(state)
+    near = np.abs(state.r) < 5 * scale
+    inliers = data.take(near)
+    seen = state.seen.take(near)
+    pose, front = facing(state.pose, inliers, seen, 3 * scale / state.projector.focal)
+    return Minimum(evaluate(pose, state.projector, data, state.seen), front)
+
+
+def _same(a: State, b: State) -> bool:
+    return (
+        same_pose(a.pose, b.pose, 0.01)
+        and abs(np.log(a.projector.focal / b.projector.focal)) < 0.02
+    )

@@ -1,0 +1,162 @@
+"""Proposals of relative pose and focal length, to be refined: five-point RANSAC and homographies.
+
+Neither knows the focal length, so both run for a ladder of focal lengths, on bearing vectors of
+the projector law. They only propose: the focal length with the most inliers can be off by 80 %.
+"""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rotation_angle
+
+from .correspondences import Correspondences
+from .epipolar import Bearings, bearings, residuals
+from .refine import Loss, evaluate
+from .triangulate import in_front
+from .vectors import Vectors
+
+LADDER = np.geomspace(1 / 3, 3, 12)
+"""Focal lengths tried, over the projector's width."""
+THRESHOLD_PX = 2.0
+RANSAC_ITERATIONS = 150
+SCORE_PX = 20.0
+_MIN_Z = 0.1  # of a unit direction: wider ones have no usable image on the plane z = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A calibration worth refining."""
+
+    pose: RigidTransform
+    """projector_from_camera, |t| = 1."""
+    focal: float
+    score: float
+    """Mean Cauchy loss at 20 px plus the share of points behind; lower is better."""
+
+
+def propose(data: Correspondences, projector: ProjectorModel, focals: Vectors) -> list[Proposal]:
+    """Return the proposals of every focal length, best first.
+
+    OpenCV's random generator starts from a fixed seed in each call, so the result depends on the
+    data alone.
+
+    Args:
+        data: a few hundred cleaned correspondences.
+        focals: (F,) pattern pixels.
+    """
+    with ThreadPoolExecutor() as pool:
+        found = pool.map(lambda f: _at_focal(data, projector.with_(focal=float(f))), focals)
+        return sorted((p for proposals in found for p in proposals), key=lambda p: p.score)
+
+
+def distinct(proposals: list[Proposal], count: int) -> list[Proposal]:
+    """Return up to ``count`` of the best that differ in pose or by 20 % in focal length."""
+    kept: list[Proposal] = []
+    for p in proposals:
+        if len(kept) == count:
+            break
+        if not any(same_pose(p.pose, k.pose, 0.1) and abs(np.log(p.focal / k.focal)) < 0.2
+                   for k in kept):  # fmt: skip
+            kept.append(p)
+    return kept
+
+
+def same_pose(a: RigidTransform, b: RigidTransform, angle: float) -> bool:
+    """Tell whether rotations and translation directions agree within ``angle``, radians."""
+    return rotation_angle(a.R @ b.R.T) < angle and angle_between(a.t, b.t) < 2 * angle
+
+
+def planar_poses(data: Correspondences, seen: Bearings, threshold: float) -> list[RigidTransform]:
+    """Return the poses that explain the data as one plane, up to four, |t| = 1.
+
+    On a plane the homography of bearings is R + t n^T / distance, which two poses in front of
+    both devices share; the five-point method sees at most one of them.
+
+    Args:
+        threshold: inlier distance on the plane z = 1 of the projector.
+    """
+    pairs = _on_unit_plane(data, seen)
+    if pairs is None:
+        return []
+    H, _ = cv2.findHomography(*pairs, method=cv2.RANSAC, ransacReprojThreshold=threshold,
+                              maxIters=100)  # fmt: skip
+    if H is None or not np.isfinite(H).all():
+        return []
+    _, rotations, translations, _ = cv2.decomposeHomographyMat(H, np.eye(3))
+    return [_unit(R, t) for R, t in zip(rotations, translations, strict=True)
+            if np.linalg.norm(t) > 1e-6]  # fmt: skip
+
+
+def facing(
+    pose: RigidTransform, data: Correspondences, seen: Bearings, noise_angle: float
+) -> tuple[RigidTransform, float]:
+    """Return the pose with the sign of t that puts most points in front, and the share that is."""
+    sign = in_front(pose, seen, residuals(pose, data.rays, seen), noise_angle)
+    reverse = RigidTransform(pose.R, -pose.t)
+    sign_reverse = in_front(reverse, seen, residuals(reverse, data.rays, seen), noise_angle)
+    if (sign_reverse < 0).sum() < (sign < 0).sum():
+        pose, sign = reverse, sign_reverse
+    return pose, 1 - float((sign < 0).mean())
+
+
+def _at_focal(data: Correspondences, projector: ProjectorModel) -> list[Proposal]:
+    seen = bearings(projector, data.q)
+    threshold = THRESHOLD_PX / projector.focal
+    return [
+        _scored(pose, data, projector, seen)
+        for pose in [
+            *_five_point_poses(data, seen, threshold),
+            *planar_poses(data, seen, 4 * threshold),
+        ]
+    ]
+
+
+def _five_point_poses(
+    data: Correspondences, seen: Bearings, threshold: float
+) -> Iterator[RigidTransform]:
+    pairs = _on_unit_plane(data, seen)
+    if pairs is None:
+        return
+    E, _ = cv2.findEssentialMat(
+        *pairs, np.eye(3), method=cv2.RANSAC, prob=0.999, threshold=threshold,
+        maxIters=RANSAC_ITERATIONS,
+    )  # fmt: skip
+    if E is None or E.shape[1] != 3:
+        return
+    # Five-point solutions that fit equally well are stacked.
+    for part in E.reshape(-1, 3, 3):
+        first, second, t = cv2.decomposeEssentialMat(part)
+        yield _unit(first, t)
+        yield _unit(second, t)
+
+
+def _on_unit_plane(data: Correspondences, seen: Bearings) -> tuple[Vectors, Vectors] | None:
+    """Return ray and bearing pairs on the planes z = 1, or None where too few have z > 0."""
+    with np.errstate(invalid="ignore"):
+        z = seen.b[2] / np.sqrt((seen.b * seen.b).sum(0))
+        usable = (data.rays[2] > _MIN_Z) & (z > _MIN_Z)
+    if usable.sum() < max(8, 0.5 * len(data)):
+        return None
+    rays, b = data.rays[:, usable], seen.b[:, usable]
+    return (
+        np.ascontiguousarray((rays[:2] / rays[2]).T), np.ascontiguousarray((b[:2] / b[2]).T)
+    )  # fmt: skip
+
+
+def _scored(
+    pose: RigidTransform, data: Correspondences, projector: ProjectorModel, seen: Bearings
+) -> Proposal:
+    pose, front = facing(pose, data, seen, THRESHOLD_PX / projector.focal)
+    fit = Loss(redescending=False, scale=SCORE_PX).cost(evaluate(pose, projector, data, seen).r)
+    return Proposal(pose, projector.focal, fit + SCORE_PX**2 * (1 - front))
+
+
+def _unit(R: ArrayLike, t: ArrayLike) -> RigidTransform:
+    direction = np.asarray(t, np.float64)
+    return RigidTransform.of(R, direction / np.linalg.norm(direction))

@@ -1,0 +1,153 @@
+"""The default start: a search over focal length and relative pose that needs no guess."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.geometry.cameras import CameraModel
+from mitsuba_endo.geometry.laws import ProjectorModel
+
+from .choose import Minimum, Problem, finish, refine, robust_scale
+from .clean import clean_map, noise_scale
+from .correspondences import Correspondences, checked_map, gather, spread_sample
+from .notes import remarks
+from .propose import LADDER, distinct, propose
+from .refine import evaluate
+from .result import Start
+from .triangulate import ranges
+
+KEEP = 5.0
+"""Correspondences within this many residual scales of their epipolar curve count as used."""
+PROPOSE_POINTS, REFINE_POINTS, FINISH_POINTS = 500, 1500, 40_000
+CANDIDATES = 8
+MAX_SCALE = 0.02
+"""Residuals above this share of the pattern's width mean that no calibration was found."""
+MIN_EXTENT_PX = 2.0
+
+
+def search_start(
+    q: NDArray[np.float64],
+    camera: CameraModel,
+    projector: ProjectorModel,
+    size: tuple[int, int],
+    *,
+    refine_focal: bool = True,
+    focal_guess: float | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Start:
+    """Find projector pose, focal length and depth from one correspondence map.
+
+    Steps: clean the map; propose poses for a ladder of focal lengths by five-point RANSAC and
+    homographies; refine the distinct best under a Cauchy loss of falling scale; choose by cost
+    among those with positive depth; finish under a redescending loss; triangulate.
+
+    Args:
+        q: (H, W, 2) pattern pixels, NaN = missing.
+        camera: the camera that saw the map.
+        projector: law, centre, aspect and distortion; its focal length is used only where
+            ``refine_focal`` is False and no guess is given.
+        size: pattern width and height, pixels.
+        refine_focal: search the focal length; False keeps it fixed.
+        focal_guess: with ``refine_focal`` one more focal length to propose, else its fixed value.
+        seed: of the samples drawn.
+        progress: called with the name of each step.
+
+    Raises:
+        InputError: fewer than 50 usable correspondences, a map that spans less than 2 pattern
+            pixels, no calibration with consistent depth and small residuals, a map and camera of
+            different size, or a fixed focal length that is not positive.
+    """
+    say = progress or (lambda _: None)
+    rng = np.random.default_rng(seed)
+    q = checked_map(q, camera)
+    focals, bounds = _focals(projector, size, refine_focal, focal_guess)
+
+    say("clean the map")
+    usable = clean_map(q)
+    data = gather(q, usable, camera)
+    _check_extent(data)
+    few = spread_sample(data, PROPOSE_POINTS, camera.width, rng)
+    some = spread_sample(data, REFINE_POINTS, camera.width, rng)
+    many = spread_sample(data, FINISH_POINTS, camera.width, rng)
+
+    say("propose poses")
+    proposals = distinct(propose(few, projector, focals), CANDIDATES)
+    say("refine candidates")
+    problem = Problem(projector, refine_focal, bounds, noise_scale(q, usable))
+    minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
+    say("finish")
+    minima = finish(problem, minima, many) if minima else []
+    _check_found(minima, size)
+    say("triangulate")
+    used, depth = _triangulated(minima[0], data, camera)
+    return Start(
+        projector=minima[0].state.projector,
+        projector_from_camera=minima[0].state.pose,
+        depth=depth,
+        used=used,
+        scale_px=robust_scale(minima[0].state),
+        notes=remarks(minima, many, refine_focal),
+        alternatives=[m.candidate for m in minima[1:]],
+    )
+
+
+def _check_found(minima: list[Minimum], size: tuple[int, int]) -> None:
+    todo = "check camera, projector law and centre, and that the map is in pattern pixels"
+    if not minima:
+        raise InputError(
+            "no projector pose puts the correspondences in front of camera and projector",
+            todo=todo,
+        )
+    scale = robust_scale(minima[0].state)
+    if scale > MAX_SCALE * size[0]:
+        raise InputError(
+            f"the best projector pose leaves epipolar residuals of {scale:.3g} pattern pixels",
+            todo=todo,
+        )
+
+
+def _check_extent(data: Correspondences) -> None:
+    low, high = data.q.min(1), data.q.max(1)
+    if (high - low).max() < MIN_EXTENT_PX:
+        raise InputError(
+            f"the correspondences span only {np.round(high - low, 3).tolist()} pattern pixels",
+            todo="give q in pattern pixels, not normalised to 0..1",
+        )
+
+
+def _triangulated(
+    minimum: Minimum, data: Correspondences, camera: CameraModel
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Return the used pixels (H, W) and their depth (H, W), baselines along the unit ray."""
+    state = evaluate(minimum.state.pose, minimum.state.projector, data)
+    at_camera, at_projector, _ = ranges(state.pose, state.seen, state.at)
+    near = np.abs(state.r) <= KEEP * robust_scale(state)
+    keep = near & (at_camera > 0) & (at_projector > 0) & np.isfinite(at_camera)
+    used = np.zeros(camera.height * camera.width, bool)
+    depth = np.full(used.shape, np.nan)
+    used[data.pixel[keep]] = True
+    depth[data.pixel[keep]] = at_camera[keep]
+    shape = (camera.height, camera.width)
+    return used.reshape(shape), depth.reshape(shape)
+
+
+def _focals(
+    projector: ProjectorModel, size: tuple[int, int], refine_focal: bool, guess: float | None
+) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Return the focal lengths to propose and the bounds that the refinement must respect."""
+    given = projector.focal if guess is None else guess
+    needed = guess is not None or not refine_focal
+    if needed and (given is None or not (np.isfinite(given) and given > 0)):
+        raise InputError(
+            f"focal length {given} is not a positive number",
+            todo="give it in pattern pixels, or let the search find it",
+        )
+    if not refine_focal:
+        return np.array([given]), (0.0, np.inf)
+    ladder = LADDER * size[0]
+    if guess is not None:
+        ladder = np.append(ladder, guess)
+    return ladder, (ladder.min() / 2, ladder.max() * 2)
