@@ -4,10 +4,11 @@ from typing import Any
 
 from mitsuba_endo.geometry.laws import LAWS, ProjectorModel, projector_model
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
+from mitsuba_endo.rendering.keys import DISTORTION
+from mitsuba_endo.rendering.untyped import dr, mi
 
-from .variants import dr, make_opaque, mi, pointer_to, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_to_world, variant_class
 
-DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 _MIN_COSINE = 0.01  # directions beyond 89.4 degrees would overflow the distortion's polynomials
 _ROUND_TRIP_PX = 1e-2
 

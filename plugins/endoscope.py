@@ -4,13 +4,11 @@ from typing import Any
 
 from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
+from mitsuba_endo.rendering.keys import LENSES
+from mitsuba_endo.rendering.untyped import dr, mi
 
-from .variants import dr, make_opaque, mi, pointer_to, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_to_world, variant_class
 
-COEFFICIENTS = {
-    "opencv": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-    "opencv_fisheye": ("k1", "k2", "k3", "k4"),
-}
 _INTRINSICS = ("fx", "fy", "cx", "cy")
 _MIN_COSINE = 0.01  # as in doe_projector
 
@@ -87,15 +85,15 @@ class Endoscope:
     def __init__(self, props: Any) -> None:
         mi.Sensor.__init__(self, props)
         self.model = str(props.get("model", "opencv"))
-        if self.model not in COEFFICIENTS:
-            expected = ", ".join(COEFFICIENTS)
+        if self.model not in LENSES:
+            expected = ", ".join(LENSES)
             raise RuntimeError(f'unknown "model" {self.model!r}, expected one of {expected}')
         width, height = self.film().size()
         self.fx = mi.Float(props["fx"])
         self.fy = mi.Float(props.get("fy", props["fx"]))
         self.cx = mi.Float(props.get("cx", (width - 1) / 2))
         self.cy = mi.Float(props.get("cy", (height - 1) / 2))
-        for name in COEFFICIENTS[self.model]:
+        for name in LENSES[self.model]:
             setattr(self, name, mi.Float(props.get(name, 0.0)))
         self.near_clip = float(props.get("near_clip", 1e-2))
         self.far_clip = float(props.get("far_clip", 1e4))
@@ -112,7 +110,7 @@ class Endoscope:
     def traverse(self, callback: Any) -> None:
         mi.Sensor.traverse(self, callback)
         moving = mi.ParamFlags.Differentiable | mi.ParamFlags.Discontinuous
-        for name in (*_INTRINSICS, *COEFFICIENTS[self.model], "to_world"):
+        for name in (*_INTRINSICS, *LENSES[self.model], "to_world"):
             callback.put(name, getattr(self, name), moving)
 
     def parameters_changed(self, keys: Any = ()) -> None:
@@ -121,7 +119,7 @@ class Endoscope:
 
     def distortion(self) -> list[Any]:
         """Return the lens coefficients in OpenCV's order."""
-        return [getattr(self, name) for name in COEFFICIENTS[self.model]]
+        return [getattr(self, name) for name in LENSES[self.model]]
 
     def _local_direction(self, u: Any, v: Any) -> Any:
         """Return the unit direction of pixels in Mitsuba's sensor frame; NaN where none exists."""

@@ -3,10 +3,12 @@
 from typing import Any
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.rendering.axes import fraction_from_pixel, swap_axes
+from mitsuba_endo.rendering.axes import swap_axes
+from mitsuba_endo.rendering.rays import pixel_rays
+from mitsuba_endo.rendering.untyped import dr, mi
 
 from . import doe_projector
-from .variants import dr, is_scalar, mi, variant_class
+from .variants import is_scalar, variant_class
 
 CHANNELS = ("projector.x", "projector.y", "depth", "visible", "camera")
 
@@ -94,13 +96,10 @@ class ProjectorCoords:
             raise RuntimeError("projector_coords needs a vectorised variant, such as llvm_ad_rgb")
         sensor = scene.sensors()[sensor] if isinstance(sensor, int) else sensor
         projector = find_projector(scene, self.projector)
-        width, height = (int(n) for n in sensor.film().crop_size())
-        index = dr.arange(mi.UInt32, width * height)
-        u, v = mi.Float(index % width), mi.Float(index // width)
-        centre = mi.Point2f(fraction_from_pixel(u, v, width, height))
-        ray, _ = sensor.sample_ray(sensor.shutter_open(), 0.5, centre, mi.Point2f(0.5))
+        ray, width, height = pixel_rays(sensor)
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=True)
         channels = self._channels(scene, sensor, projector, si)
+        index = dr.arange(mi.UInt32, width * height)
         image = dr.zeros(mi.Float, width * height * len(CHANNELS))
         for i, channel in enumerate(channels):
             dr.scatter(image, channel, index * len(CHANNELS) + i, mode=dr.ReduceMode.Permute)

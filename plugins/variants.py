@@ -7,15 +7,10 @@ written as a plain template whose members are copied onto the base of the active
 import functools
 from typing import Any
 
-import drjit
-import mitsuba
 import numpy as np
 
 from mitsuba_endo.rendering.axes import is_rigid
-
-# Their members depend on the active variant, so they have no static types.
-dr: Any = drjit
-mi: Any = mitsuba
+from mitsuba_endo.rendering.untyped import dr, mi
 
 _NOT_COPIED = ("__dict__", "__weakref__")
 

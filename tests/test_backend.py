@@ -1,0 +1,61 @@
+"""Starting Mitsuba."""
+
+import subprocess
+import sys
+
+import pytest
+
+from mitsuba_endo import backend
+from mitsuba_endo.errors import InputError
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_importing_the_package_starts_nothing() -> None:
+    """NumPy-only stages must not wait for a compiler to load."""
+    modules = "mitsuba_endo, mitsuba_endo.backend, mitsuba_endo.geometry.laws, mitsuba_endo.shapes"
+    done = run(f"import sys, {modules}; print(sorted({{'mitsuba', 'drjit'}} & set(sys.modules)))")
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_exceptions_of_mitsuba_reach_python(llvm: str) -> None:
+    """The LLVM wheel's C++ runtime must not catch Mitsuba's exceptions (it crashed the process)."""
+    done = run(
+        "from mitsuba_endo import backend; backend.use('llvm_ad_rgb')\n"
+        "import mitsuba as mi\n"
+        "try: mi.load_dict({'type': 'nonsense'})\n"
+        "except RuntimeError as error: print('caught', 'nonsense' in str(error))"
+    )
+    assert done.stdout.strip() == "caught True", done.stderr
+
+
+def test_use_falls_back_and_ensure_keeps_the_variant(llvm: str) -> None:
+    """Oracle: the variant that is active afterwards."""
+    import mitsuba as mi
+
+    assert backend.use("llvm_ad_mono") == "llvm_ad_mono" == mi.variant()
+    assert backend.ensure() == "llvm_ad_mono"
+    assert backend.use("llvm_ad_rgb") == "llvm_ad_rgb"
+
+
+def test_unknown_variant_is_refused(llvm: str) -> None:
+    """One sentence that says where to look for help."""
+    with pytest.raises(InputError, match="doctor"):
+        backend.use("metal_ad_rgb")
+
+
+def test_there_are_two_threads(llvm: str) -> None:
+    """With one thread, EXR files deadlock."""
+    import drjit as dr
+
+    assert dr.thread_count() >= 2
+
+
+def test_llvm_path_of_the_user_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Oracle: the environment variable."""
+    monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/opt/llvm/libLLVM.so")
+    assert str(backend.locate_llvm()) == "/opt/llvm/libLLVM.so"
