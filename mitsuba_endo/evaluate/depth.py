@@ -28,16 +28,21 @@ class RayCaster:
 
         Same frame and unit as the vertices.
         """
+        return self.meet(origin, directions)[0]
+
+    def meet(self, origin: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64]]:
+        """Return the distance, as :meth:`range`, and the face (N,) that is met, 0 for a miss."""
         import mitsuba as mi
 
         start = mi.Point3f(origin.astype(np.float32))
-        triangle, hit = self._mesh.cast(start, mi.Vector3f(directions.T.astype(np.float32)))
-        a, b, c = np.moveaxis(self._corners[np.array(triangle).astype(np.int64)], 1, 0)
+        index, hit = self._mesh.cast(start, mi.Vector3f(directions.T.astype(np.float32)))
+        triangle = np.array(index).astype(np.int64)
+        a, b, c = np.moveaxis(self._corners[triangle], 1, 0)
         normal = np.cross(b - a, c - a)
         slope = np.sum(normal * directions, -1)
         met = np.array(hit).astype(bool) & (slope != 0)
         height = np.sum(normal * (a - origin), -1)
-        return np.where(met, height / np.where(met, slope, 1.0), np.nan)
+        return np.where(met, height / np.where(met, slope, 1.0), np.nan), triangle
 
 
 def range_image(caster: RayCaster, camera: CameraModel) -> Floats:

@@ -1,0 +1,1 @@
+"""Pictures of a calibration and the folder that holds its result."""

@@ -1,0 +1,203 @@
+"""Figures of a calibration: functions from records to matplotlib figures, no global state."""
+
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from ..files import atomic_path
+from ..geometry.transforms import RigidTransform
+from ..records.calibration import Calibration, FrameMaps, TraceRow
+from ..records.solution import Solution
+from . import panels
+from .view import SurfaceView
+
+DPI = 110
+_PANEL_AREA = 13.0  # square inches of image in a panel
+_MAX_COLUMNS = 4
+
+
+def save_figure(path: str | Path, figure: Figure) -> None:
+    """Write a figure as PNG.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    with atomic_path(path) as aside:
+        figure.savefig(aside, dpi=DPI, format="png")
+
+
+def coordinates_figure(frames: list[FrameMaps], which: Literal["observed", "rendered"]) -> Figure:
+    """Draw the maps of projector coordinates, x and y side by side, a pair for every frame.
+
+    Observed and rendered maps share their colour scale.
+    """
+    limits = [panels.coordinate_limits(frames, c) for c in (0, 1)]
+    figure, axes = _grid(frames)
+    for frame, pair in zip(frames, axes, strict=True):
+        image = frame.observed if which == "observed" else frame.rendered
+        for c in (0, 1):
+            title = f"{which.capitalize()} projector {'xy'[c]}{_of(frame, frames)}"
+            panels.coordinate(pair[c], image[..., c], limits[c], title)
+    return figure
+
+
+def residual_figure(frames: list[FrameMaps]) -> Figure:
+    """Draw observed - rendered, signed, x and y side by side, a pair for every frame."""
+    limit = panels.residual_range(frames)
+    figure, axes = _grid(frames)
+    for frame, pair in zip(frames, axes, strict=True):
+        for c in (0, 1):
+            title = f"Residual {'xy'[c]}{_of(frame, frames)}"
+            panels.residual(pair[c], frame, c, limit, title)
+    return figure
+
+
+def histogram_figure(
+    frames: list[FrameMaps], noise_px: float | None = None, scale_px: float | None = None
+) -> Figure:
+    """Draw the distribution of the residuals.
+
+    Args:
+        frames: maps with their residuals.
+        noise_px: standard deviation of a normal distribution to compare with, pattern pixels.
+        scale_px: scale of the robust loss, pattern pixels.
+    """
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    panels.residual_histogram(figure.subplots(), frames, noise_px, scale_px)
+    return figure
+
+
+def convergence_figure(trace: list[TraceRow]) -> Figure:
+    """Draw cost and, where it is one number, focal length against the iteration."""
+    with_focal = any(row.focal is not None for row in trace)
+    figure = Figure(figsize=(7, 6 if with_focal else 3.5), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(2 if with_focal else 1, sharex=True))
+    panels.trace_cost(axes[0], trace)
+    if with_focal:
+        panels.trace_focal(axes[1], trace)
+    axes[-1].set_xlabel("iteration")
+    if trace:
+        last = trace[-1]
+        axes[0].set_title(f"{last.iteration} iterations, {last.seconds:.1f} s")
+    return figure
+
+
+def surface_figure(view: SurfaceView, unit: str) -> Figure:
+    """Draw the depth of the surface in the first camera and, if known, its uncertainty."""
+    height, width = view.depth.shape
+    count = 1 if view.std is None else 2
+    figure = Figure(figsize=_size(width, height, count, 1), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, count))
+    panels.depth(axes[0], view, unit, "Surface in the first camera")
+    if view.std is not None:
+        panels.surface_std(axes[1], view, unit)
+    return figure
+
+
+def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
+    """Draw what tells a good calibration from a bad one at one look: maps, residuals, surface.
+
+    Shows the first frame's x maps, the residuals of the frame that fits worst, all residuals'
+    distribution, the surface and the rig; the numbers are in the title.
+    """
+    frames, solution = calibration.frames, calibration.solution
+    unit = unit_name(solution)
+    height, width = view.depth.shape
+    size = _size(width, height, 3, 2)
+    figure = Figure(
+        figsize=(size[0], size[1] + 0.6), layout=ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.08)
+    )
+    axes = figure.subplots(2, 3)
+    limits = panels.coordinate_limits(frames, 0)
+    first, worst = frames[0], max(frames, key=lambda f: panels.residual_range([f]))
+    panels.coordinate(
+        axes[0, 0], first.observed[..., 0], limits, f"Observed projector x{_of(first, frames)}"
+    )
+    panels.coordinate(
+        axes[0, 1], first.rendered[..., 0], limits, f"Rendered projector x{_of(first, frames)}"
+    )
+    limit = panels.residual_range([worst])
+    panels.residual(axes[0, 2], worst, 0, limit, f"Residual x{_of(worst, frames, 'worst: ')}")
+    panels.depth(axes[1, 0], view, unit)
+    panels.rig_section(axes[1, 1], view, calibration.camera, _projectors(solution), unit)
+    scale = calibration.trace[-1].scale_px if calibration.trace else None
+    panels.residual_histogram(axes[1, 2], frames, solution.noise_px, scale)
+    figure.suptitle(headline(solution))
+    return figure
+
+
+def headline(solution: Solution) -> str:
+    """Return outcome, focal length, first baseline and residual in one line."""
+    parts = [solution.outcome.replace("_", " ")]
+    focal = solution.frames[0].focal or solution.projector.focal
+    parts.append(f"focal length {_quantity(focal.value, focal.std, focal.status, 'pattern px')}")
+    pose = solution.frames[0].projector_from_camera.to_transform()
+    if pose is None:
+        parts.append("projector pose unknown")
+    elif solution.units == "mm":
+        given = " (given)" if solution.scale == "baseline" else ""
+        parts.append(f"baseline {np.linalg.norm(pose.t):.5g} mm{given}")
+    else:
+        parts.append("up to scale")
+    rms = [f.rms_px for f in solution.frames if f.rms_px is not None]
+    if rms:
+        parts.append(f"residual {math.sqrt(np.mean(np.square(rms))):.3g} px RMS")
+    return "; ".join(parts)
+
+
+def unit_name(solution: Solution) -> str:
+    """Return the unit of length as a label."""
+    return "mm" if solution.units == "mm" else "baselines"
+
+
+def _quantity(value: Any, std: Any, status: str, unit: str) -> str:
+    if value is None:
+        return f"unknown ({status})"
+    if status == "fixed":
+        return f"{value:.6g} {unit} (given)"
+    digits = f"{value:.6g}"
+    if isinstance(std, float | int) and std > 0:
+        places = max(0, 1 - math.floor(math.log10(std)))  # two significant digits of the std
+        digits = f"{value:.{places}f} ± {std:.{places}f}"
+    return f"{digits} {unit}" + ("" if status == "measured" else f" ({status})")
+
+
+def _projectors(solution: Solution) -> list[RigidTransform]:
+    """Return every known projector's pose in the first camera's frame."""
+    first = solution.frames[0].world_from_camera.to_transform()
+    found = []
+    for frame in solution.frames:
+        pose = frame.projector_from_camera.to_transform()
+        camera = frame.world_from_camera.to_transform()
+        if frame is solution.frames[0]:
+            camera = first = first or RigidTransform.identity()
+        if pose is not None and camera is not None and first is not None:
+            found.append(first.inverse() @ camera @ pose.inverse())
+    return found
+
+
+def _of(frame: FrameMaps, frames: list[FrameMaps], prefix: str = "") -> str:
+    return f"\n{prefix}{frame.name}" if len(frames) > 1 else ""
+
+
+def _grid(frames: list[FrameMaps]) -> tuple[Figure, Any]:
+    """Return a figure with two panels for every frame, and its axes (frames, 2)."""
+    height, width = frames[0].observed.shape[:2]
+    pairs = 1 if len(frames) <= 2 else min(_MAX_COLUMNS // 2, len(frames))
+    rows = math.ceil(len(frames) / pairs)
+    figure = Figure(figsize=_size(width, height, 2 * pairs, rows), layout="constrained")
+    axes = figure.subplots(rows, 2 * pairs, squeeze=False).reshape(rows * pairs, 2)
+    for spare in axes[len(frames) :].ravel():
+        spare.set_visible(False)
+    return figure, axes[: len(frames)]
+
+
+def _size(width: int, height: int, columns: int, rows: int) -> tuple[float, float]:
+    """Return a figure's size in inches, with panels of the image's shape and equal area."""
+    panel_width = min(max(math.sqrt(_PANEL_AREA * width / height), 2.6), 6.0)
+    panel_height = panel_width * height / width
+    return columns * (panel_width + 1.1), rows * (panel_height + 0.75)

@@ -1,0 +1,124 @@
+"""The folder that a calibration leaves behind."""
+
+import csv
+import re
+from dataclasses import astuple, fields
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from ..files import atomic_folder, atomic_path
+from ..records.calibration import Calibration, TraceRow
+from ..records.correspondence import save_map
+from ..records.rig import Rig
+from ..records.solution import Solution, save_solution
+from ..records.surface import save_surface
+from . import figures
+from .scene_file import save_scene
+from .view import SurfaceView, view_surface
+
+SURFACE = "surface.ply"
+SCENE = "scene.xml"
+
+
+def write_solution_folder(
+    path: str | Path, calibration: Calibration, rig: Rig | None = None
+) -> Solution:
+    """Write everything a calibration found, all of it or nothing.
+
+    ====================  =========================================================================
+    solution.json         values, uncertainty, verdict
+    surface.ply           the surface in the first camera's frame, ``std_0`` per vertex
+    scene.xml             the calibrated scene; left out, with a warning in solution.json, where a
+                          value it needs could not be determined
+    rendered*.exr         projector coordinates rendered from the solution, one file a frame
+    trace.csv             the iterations
+    rig.yaml              the rig with all defaults filled in, if given
+    overview.png          look at this first; the other pictures show the same at full size:
+                          observed, rendered, residual, histogram, surface, convergence
+    ====================  =========================================================================
+
+    Returns:
+        The solution as written: with the surface's file name and any new warning.
+
+    Raises:
+        InputError: the folder holds other files or cannot be written.
+    """
+    with atomic_folder(path) as folder:
+        solution = _write_scene(folder, calibration, rig)
+        save_solution(folder / "solution.json", solution)
+        save_surface(folder / SURFACE, calibration.surface)
+        save_trace(folder / "trace.csv", calibration.trace)
+        for name, frame in zip(map_names(calibration), calibration.frames, strict=True):
+            save_map(folder / name, frame.rendered)
+        if rig is not None:
+            _save_rig(folder / "rig.yaml", rig)
+        _save_pictures(folder, calibration, view_surface(calibration.surface, calibration.camera))
+    return solution
+
+
+def map_names(calibration: Calibration) -> list[str]:
+    """Return the file names of the rendered maps: ``rendered.exr``, or one a frame."""
+    if len(calibration.frames) == 1:
+        return ["rendered.exr"]
+    plain = [re.sub(r"[^\w.-]+", "_", frame.name) for frame in calibration.frames]
+    return [f"rendered_{i:02d}_{Path(name).stem}.exr" for i, name in enumerate(plain)]
+
+
+def save_trace(path: str | Path, trace: list[TraceRow]) -> None:
+    """Write the iterations as CSV; an empty field is a value that does not exist."""
+    with atomic_path(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(f.name for f in fields(TraceRow))
+        writer.writerows(astuple(row) for row in trace)
+
+
+def _save_rig(path: Path, rig: Rig) -> None:
+    with atomic_path(path) as aside:
+        text = yaml.safe_dump(rig.model_dump(mode="json"), sort_keys=False)
+        aside.write_text(text, encoding="utf-8")
+
+
+def _save_pictures(folder: Path, calibration: Calibration, view: SurfaceView) -> None:
+    frames, solution, trace = calibration.frames, calibration.solution, calibration.trace
+    unit = figures.unit_name(solution)
+    scale = trace[-1].scale_px if trace else None
+    pictures = {
+        "overview": figures.overview_figure(calibration, view),
+        "observed": figures.coordinates_figure(frames, "observed"),
+        "rendered": figures.coordinates_figure(frames, "rendered"),
+        "residual": figures.residual_figure(frames),
+        "histogram": figures.histogram_figure(frames, solution.noise_px, scale),
+        "surface": figures.surface_figure(view, unit),
+    }
+    if trace:
+        pictures["convergence"] = figures.convergence_figure(trace)
+    for name, figure in pictures.items():
+        figures.save_figure(folder / f"{name}.png", figure)
+
+
+def _write_scene(folder: Path, calibration: Calibration, rig: Rig | None) -> Solution:
+    """Write scene.xml if everything in it is known; return the solution, which says so if not."""
+    solution = calibration.solution.model_copy(update={"surface": SURFACE})
+    first = solution.frames[0]
+    projector = solution.projector
+    if first.focal is not None:
+        projector = projector.model_copy(update={"focal": first.focal})
+    model, pose = projector.to_model(), first.projector_from_camera.to_transform()
+    width = projector.width or (rig.projector.width if rig else None)
+    height = projector.height or (rig.projector.height if rig else None)
+    missing = [
+        name
+        for name, value in (
+            ("the projector's intrinsics", model), ("the projector's pose", pose),
+            ("the pattern's size", width and height),
+        )
+        if value is None
+    ]  # fmt: skip
+    if model is None or pose is None or width is None or height is None:
+        warning = f"{SCENE} is left out, because {' and '.join(missing)} could not be determined"
+        return solution.model_copy(update={"warnings": [*solution.warnings, warning]})
+    distance = float(np.median(np.linalg.norm(calibration.surface.vertices, axis=-1)))
+    save_scene(folder / SCENE, calibration.camera, model, (width, height), pose, SURFACE, distance)
+    return solution

@@ -1,0 +1,68 @@
+"""What the first camera sees of the measured surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from ..evaluate.depth import RayCaster
+from ..geometry.cameras import CameraModel
+from ..records.calibration import SurfaceEstimate
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceView:
+    """Images of a surface in a camera, NaN where the camera does not see it."""
+
+    points: Floats
+    """(H, W, 3) seen points, camera frame, the surface's unit."""
+    normals: Floats
+    """(H, W, 3) smooth unit normals, towards the camera."""
+    std: Floats | None
+    """(H, W) standard deviation of the surface along the ray, the surface's unit."""
+
+    @property
+    def depth(self) -> Floats:
+        """(H, W) z of the seen points."""
+        return self.points[..., 2]
+
+
+def view_surface(surface: SurfaceEstimate, camera: CameraModel) -> SurfaceView:
+    """Cast every pixel's ray at a surface in the camera's frame."""
+    rays = camera.rays(camera.pixel_grid())
+    flat = rays.reshape(-1, 3)
+    distance, triangle = RayCaster(surface.vertices, surface.faces).meet(np.zeros(3), flat)
+    seen = np.isfinite(distance)
+    points = np.full(flat.shape, np.nan)
+    points[seen] = flat[seen] * distance[seen, None]
+    corners = surface.faces[triangle[seen]]
+    weights = _barycentric(points[seen], surface.vertices[corners])
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    normals = np.full(flat.shape, np.nan)
+    normals[seen] = _towards_camera(
+        np.einsum("nk,nkc->nc", weights, np.asarray(mesh.vertex_normals)[corners]), flat[seen]
+    )
+    std = None
+    if surface.std is not None:
+        std = np.full(len(flat), np.nan)
+        std[seen] = np.sum(weights * surface.std[corners], -1)
+        std = std.reshape(rays.shape[:2])
+    return SurfaceView(points.reshape(rays.shape), normals.reshape(rays.shape), std)
+
+
+def _barycentric(points: Floats, corners: Floats) -> Floats:
+    """Return the weights (N, 3) of points (N, 3) in the planes of triangles (N, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normal = np.cross(b - a, c - a)
+    squared = np.sum(normal * normal, -1)
+    w_b = np.sum(np.cross(points - a, c - a) * normal, -1) / squared
+    w_c = np.sum(np.cross(b - a, points - a) * normal, -1) / squared
+    return np.stack([1 - w_b - w_c, w_b, w_c], -1)
+
+
+def _towards_camera(normals: Floats, rays: Floats) -> Floats:
+    unit = normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
+    return np.where(np.sum(unit * rays, -1, keepdims=True) > 0, -unit, unit)
