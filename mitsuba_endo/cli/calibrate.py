@@ -8,9 +8,9 @@ import typer
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 
 if TYPE_CHECKING:
-    from ..records.calibration import Calibration
     from ..records.correspondence import CorrespondenceMap
     from ..records.rig import Rig
+    from ..records.solution import Solution
     from ..solve.options import Options
 
 Maps = Annotated[
@@ -57,9 +57,9 @@ def calibrate(
         check_output_folder(out)
         frames, rig_record = load_input(maps, rig, share)
         options = Options(solver=solver, start=start, seed=seed)
-        result = solve_and_write(frames, rig_record, options, out, output)
-        report(result, out, output)
-        raise typer.Exit(exit_code(result))
+        solution = solve_and_write(frames, rig_record, options, out, output)
+        report(solution, out, output)
+        raise typer.Exit(exit_code(solution))
 
 
 def load_input(
@@ -117,38 +117,34 @@ def with_sharing(rig: "Rig", text: str) -> "Rig":
 
 def solve_and_write(
     maps: list["CorrespondenceMap"], rig: "Rig", options: "Options", out: Path, output: Session
-) -> "Calibration":
-    """Calibrate with a progress bar and write the solution folder."""
-    from ..show.solution_folder import write_solution_folder
-    from ..solve.calibrate import calibrate as solve
-
+) -> "Solution":
+    """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
         from .. import backend
+        from ..show.solution_folder import write_solution_folder
+        from ..solve.calibrate import calibrate as solve
 
         backend.use()
         result = solve(maps, rig, options, advance)
-        advance(1.0, "Writing pictures")
-        write_solution_folder(out, result)
-    return result
+        advance(0.95, "Drawing pictures")
+        return write_solution_folder(out, result, rig)
 
 
-def exit_code(result: "Calibration") -> int:
+def exit_code(solution: "Solution") -> int:
     """0 if the calibration converged, 130 if the user stopped it, else 1."""
     from ..records.solution import Outcome
 
     special = {Outcome.CONVERGED: 0, Outcome.INTERRUPTED: EXIT_INTERRUPTED}
-    return special.get(result.solution.outcome, EXIT_FAULT)
+    return special.get(solution.outcome, EXIT_FAULT)
 
 
-def report(result: "Calibration", out: Path, output: Session) -> None:
+def report(solution: "Solution", out: Path, output: Session) -> None:
     """Print what was found."""
     from .summary import solution_table
 
-    solution = result.solution
-    output.print(solution_table(solution), *solution.verdict)
-    for warning in solution.warnings:
-        output.print(f"warning: {warning}")
-    output.print(f"Outcome: {solution.outcome}. Look at {out}/residual.png first.")
+    warnings = [f"warning: {warning}" for warning in solution.warnings]
+    output.print(solution_table(solution), *solution.verdict, *warnings)
+    output.print(f"Outcome: {solution.outcome}. Look at {out}/overview.png first.")
     output.summary(
         {"folder": str(out), "solution": solution.model_dump(mode="json", by_alias=True)}
     )

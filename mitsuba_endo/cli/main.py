@@ -6,8 +6,10 @@ import typer
 
 from .. import __version__
 from .calibrate import calibrate
+from .demo import demo
 from .doctor import doctor
 from .evaluate import evaluate
+from .render import render
 
 app = typer.Typer(
     name="mitsuba-endo",
@@ -15,7 +17,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (doctor, calibrate, evaluate):
+for command in (demo, doctor, render, calibrate, evaluate):
     app.command()(command)
 
 

@@ -96,6 +96,28 @@ def _table(title: str, *columns: str) -> "Table":
     return table
 
 
+def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
+    """Set what was found beside the truth, for the first frame."""
+    table = _table("Found and true", "Quantity", "Found", "Std", "True", "Unit")
+    focal, true_focal = solution.projector.focal, truth.projector.focal
+    table.add_row(
+        "projector focal length", numbers(focal.value), numbers(focal.std, 2),
+        numbers(true_focal.value), "pattern px",
+    )  # fmt: skip
+    found, true = (s.frames[0].projector_from_camera for s in (solution, truth))
+    poses = found.to_transform(), true.to_transform()
+    std = found.std or [None] * 6
+    if poses[0] is not None and poses[1] is not None:
+        R, R_true = (np.degrees(_rotation_vector(pose.R)).tolist() for pose in poses if pose)
+        degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
+        row = numbers(R, 4), _listed(degrees), numbers(R_true, 4), "deg"
+        table.add_row("projector rotation vector", *row)
+        t, t_true = (pose.t.tolist() for pose in poses if pose)
+        row = numbers(t, 4), _listed(std[3:]), numbers(t_true, 4), solution.units
+        table.add_row("projector translation", *row)
+    return table
+
+
 def metrics_table(metrics: "Metrics") -> "Table":
     """List the errors against the truth, or why there is none."""
     table = _table("Errors against the truth", "Quantity", "Error", "Unit", "Note")

@@ -91,6 +91,14 @@ def test_help_is_fast():
     assert spent < 0.5
 
 
+def test_help_lists_the_commands():
+    """Oracle: the names in the README."""
+    result = run("--help")
+    assert result.exit_code == 0
+    for name in ("demo", "doctor", "render", "calibrate", "evaluate"):
+        assert name in result.stdout
+
+
 def test_version():
     """Oracle: the package's metadata."""
     from importlib.metadata import version

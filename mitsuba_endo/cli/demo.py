@@ -1,0 +1,103 @@
+"""``mitsuba-endo demo``: the whole way from a scene to a judged calibration."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .calibrate import exit_code, load_input, solve_and_write
+from .console import Debug, Json, Quiet, Session, session
+from .evaluate import evaluate_folders
+from .render import capture_scene
+
+if TYPE_CHECKING:
+    from ..evaluate.metrics import Metrics
+    from ..records.solution import Solution
+
+Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
+
+SCENE = "stomach"
+SETTINGS = {"width": "240", "height": "180", "fx": "170", "cx": "120.4", "cy": "88.6"}
+"""The scene's camera at half its resolution."""
+SPP = 32
+NOISE_PX = 0.3
+OUTLIERS = 0.02
+
+
+def demo(
+    out: Out = Path("demo-output"),
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Render an endoscope in a stomach, calibrate it from a map alone, compare with the truth."""
+    with session(quiet, as_json, debug) as output:
+        from ..files import atomic_folder, check_output_folder
+        from ..records.solution import load_solution
+        from ..solve.options import Options
+
+        started = time.perf_counter()
+        check_output_folder(out)
+        with atomic_folder(out) as folder:
+            _make_input(folder, seed, output)
+            maps, rig = load_input([folder / "input" / "map.exr"], folder / "input" / "rig.yaml")
+            solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
+            metrics = evaluate_folders(folder / "solution", folder / "capture" / "truth.json")
+            metrics.save(folder / "metrics.json")
+            truth = load_solution(folder / "capture" / "truth.json")
+        _report(solution, truth, metrics, out, time.perf_counter() - started, output)
+        raise typer.Exit(exit_code(solution))
+
+
+def _make_input(folder: Path, seed: int, output: Session) -> None:
+    """Write the capture with its truth, and apart from it what a user would have of it."""
+    from ..records.correspondence import load_map, save_map
+    from ..records.known_input import save_rig
+    from ..records.rig import load_rig
+    from ..rendering.decoder_errors import like_decoded
+    from ..show.capture_folder import MAP, RIG, write_capture_folder
+
+    capture, loaded = capture_scene(SCENE, SETTINGS, SPP, seed, output)
+    write_capture_folder(folder / "capture", capture, loaded)
+    exact = load_map(folder / "capture" / MAP)
+    rig = load_rig(folder / "capture" / RIG)
+    size = rig.projector.width, rig.projector.height
+    save_map(folder / "input" / "map.exr", like_decoded(exact.q, size, NOISE_PX, OUTLIERS, seed))
+    save_rig(folder / "input" / "rig.yaml", rig)
+
+
+def _report(
+    solution: "Solution",
+    truth: "Solution",
+    metrics: "Metrics",
+    out: Path,
+    seconds: float,
+    output: Session,
+) -> None:
+    from .summary import comparison_table, metrics_table
+
+    output.print(
+        f"An endoscope before a stomach wall, {SETTINGS['width']} x {SETTINGS['height']} pixels. Projector "
+        f"coordinates with {NOISE_PX} px noise and {100 * OUTLIERS:.0f} % outliers; focal length, "
+        "pose and surface unknown, the length of the baseline given.",
+        comparison_table(solution, truth),
+        metrics_table(metrics),
+        *solution.verdict,
+        f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
+        f"  {out}/capture/image.png        what the endoscope sees",
+        f"  {out}/solution/overview.png    maps, residuals, surface and rig",
+        f"  {out}/solution/solution.json   the result, {out}/metrics.json its errors",
+        f"Again by hand: mitsuba-endo calibrate {out}/input/map.exr "
+        f"--rig {out}/input/rig.yaml --out result",
+    )
+    output.summary(
+        {
+            "folder": str(out),
+            "outcome": solution.outcome,
+            "seconds": seconds,
+            "metrics": metrics.model_dump(mode="json"),
+        }
+    )

@@ -1,0 +1,86 @@
+"""``mitsuba-endo render``: from a scene to a synthetic capture with its truth."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .console import Debug, Json, Quiet, Session, session
+
+if TYPE_CHECKING:
+    from ..rendering.render import Capture
+    from ..rendering.scene import LoadedScene
+
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="Scene XML, or the name of a packaged scene.")
+]
+Out = Annotated[Path, typer.Option("--out", help="Capture folder to write.")]
+Set = Annotated[
+    list[str],
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Parameter of the scene; may be given several times."
+    ),
+]
+Samples = Annotated[int, typer.Option(min=1, help="Samples per pixel of the image.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the image's noise.")]
+
+
+def render(
+    scene: Scene,
+    out: Out,
+    parameters: Set = [],  # noqa: B006  typer copies it
+    spp: Samples = 64,
+    seed: Seed = 0,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Render image, projector coordinates, depth, normals, masks and exact truth of a scene."""
+    with session(quiet, as_json, debug) as output:
+        from ..files import check_output_folder
+        from ..show.capture_folder import write_capture_folder
+
+        check_output_folder(out)
+        capture, loaded = capture_scene(scene, parse_settings(parameters), spp, seed, output)
+        write_capture_folder(out, capture, loaded)
+        lit = float(capture.visible.mean())
+        width, height = capture.image.shape[1], capture.image.shape[0]
+        output.print(f"{out}: {width} x {height} pixels, {100 * lit:.0f} % lit by the projector.")
+        output.summary({"folder": str(out), "width": width, "height": height, "lit": lit})
+
+
+def capture_scene(
+    scene: str, parameters: dict[str, str], spp: int, seed: int, output: Session
+) -> tuple["Capture", "LoadedScene"]:
+    """Render a scene and note in the truth how it was made."""
+    from dataclasses import replace
+
+    from ..show.capture_folder import MAP
+
+    with output.progress("Starting Mitsuba") as advance:
+        from ..rendering.render import render_capture
+        from ..rendering.scene import load_scene
+
+        loaded = load_scene(scene, **parameters)
+        advance(0.2, "Rendering")
+        capture = render_capture(loaded, spp=spp, seed=seed, name=MAP)
+    made = {"scene": scene, "parameters": dict(loaded.parameters), "spp": spp, "seed": seed}
+    truth = capture.truth.model_copy(update={"configuration": made})
+    return replace(capture, truth=truth), loaded
+
+
+def parse_settings(settings: list[str]) -> dict[str, str]:
+    """Split every ``name=value``.
+
+    Raises:
+        InputError: one has another form.
+    """
+    from ..errors import InputError
+
+    parsed = {}
+    for setting in settings:
+        name, equals, value = setting.partition("=")
+        if not (name.strip() and equals):
+            raise InputError(f"'{setting}' is not name=value", "--set", "e.g. --set width=320")
+        parsed[name.strip()] = value
+    return parsed

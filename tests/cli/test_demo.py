@@ -1,0 +1,119 @@
+"""The whole way, from a scene to a judged calibration, and what happens when it is cut short."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from mitsuba_endo.cli import demo
+from tests.cli.inputs import run
+
+SMALL = {"width": "168", "height": "126", "fx": "119", "cx": "84.3", "cy": "62.0"}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """The folder and the JSON summary of one demo at a small image size."""
+    out = tmp_path_factory.mktemp("demo") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo, "SETTINGS", SMALL)
+        result = run("demo", "--out", out, "--json", "--quiet", "--debug")
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == ""
+    return out, json.loads(result.stdout)
+
+
+def test_demo_finds_the_truth(finished: tuple[Path, dict[str, Any]]):
+    """Oracle: the rendered scene's own parameters.
+
+    A picture this small (168 x 126) leaves the surface coarse, which costs 0.15 % in focal length,
+    1 degree in direction and 0.6 mm on three seeds; the limits are twice to three times that.
+    """
+    metrics = finished[1]["metrics"]
+    assert metrics["focal_error_percent"] < 0.5
+    assert metrics["rotation_error_deg"] < 0.1
+    assert metrics["translation_direction_error_deg"] < 2
+    assert metrics["shape_median_mm"] < 1.5
+    assert metrics["coverage"] > 0.95
+
+
+def test_demo_leaves_everything_it_names(finished: tuple[Path, dict[str, Any]]):
+    """Oracle: the paths that the summary tells the user to look at."""
+    out, _ = finished
+    for name in (
+        "capture/image.png", "capture/truth.json", "input/map.exr", "input/rig.yaml",
+        "solution/overview.png", "solution/solution.json", "solution/surface.ply", "metrics.json",
+    ):  # fmt: skip
+        assert (out / name).stat().st_size > 100, name
+    assert [p.name for p in out.parent.iterdir()] == ["out"]
+
+
+def test_input_holds_no_answer(finished: tuple[Path, dict[str, Any]]):
+    """Oracle: the list of unknowns; the map itself is noisy."""
+    out, _ = finished
+    assert sorted(p.name for p in (out / "input").iterdir()) == ["map.exr", "rig.yaml"]
+    projector = yaml.safe_load((out / "input" / "rig.yaml").read_text())["projector"]
+    assert projector["focal"] == {"refine": True}
+    assert "pose" not in projector
+
+
+def test_input_alone_gives_the_same_result(finished: tuple[Path, dict[str, Any]], tmp_path: Path):
+    """Oracle: the demo's own solution, found again by `calibrate` where no truth is in reach."""
+    shutil.copytree(finished[0] / "input", tmp_path / "input")
+    result = run("calibrate", tmp_path / "input" / "map.exr", "--rig", tmp_path / "input/rig.yaml",
+                 "--out", tmp_path / "again", "--json")  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    again = json.loads(result.stdout)["solution"]
+    there = json.loads((finished[0] / "solution" / "solution.json").read_text())
+    # Sums run over threads in any order, so the last digits may differ.
+    assert again["projector"]["focal"]["value"] == pytest.approx(
+        there["projector"]["focal"]["value"], rel=1e-5
+    )
+    assert "Projector pose" in result.stderr
+
+
+def test_evaluate_gives_the_same_metrics(finished: tuple[Path, dict[str, Any]], tmp_path: Path):
+    """Oracle: the metrics that the demo wrote."""
+    out, summary = finished
+    result = run("evaluate", out / "solution", "--truth", out / "capture" / "truth.json",
+                 "--out", tmp_path / "metrics.json", "--json")  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    written = json.loads((tmp_path / "metrics.json").read_text())
+    assert json.loads(result.stdout) == written == summary["metrics"]
+
+
+def test_ctrl_c_leaves_the_output_absent_or_complete(tmp_path: Path):
+    """Oracle: the listing of the parent folder after SIGINT in the middle of the work."""
+    command = [
+        sys.executable,
+        "-m",
+        "mitsuba_endo.cli.main",
+        "demo",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        deadline = time.monotonic() + 120
+        # The rig file is the last thing written before the solver starts.
+        while not list(tmp_path.glob(".out.*/input/rig.yaml")):
+            assert process.poll() is None, process.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        os.kill(process.pid, signal.SIGINT)
+        _, error = process.communicate(timeout=120)
+    finally:
+        process.kill()
+    assert process.returncode == 130, error
+    assert error.startswith("error: interrupted")
+    assert "Traceback" not in error
+    left = [p.name for p in tmp_path.iterdir()]
+    assert left == [] or (left == ["out"] and (tmp_path / "out" / "metrics.json").exists())
