@@ -1,0 +1,1 @@
+"""Joint estimation of surface, poses and projector from correspondence maps."""

@@ -30,7 +30,7 @@ class Correspondences:
         return Correspondences(self.pixel[index], self.rays[:, index], self.q[:, index])
 
 
-def checked_map(q: NDArray, camera: CameraModel) -> NDArray[np.float64]:
+def checked_map(q: NDArray[np.floating], camera: CameraModel) -> NDArray[np.float64]:
     """Return ``q`` as float64 after checking its shape (camera height, camera width, 2).
 
     Raises:

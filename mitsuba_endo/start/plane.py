@@ -18,7 +18,7 @@ from .result import Start
 
 
 def plane_start(
-    q: NDArray[np.float64],
+    q: NDArray[np.floating],
     camera: CameraModel,
     projector: ProjectorModel,
     *,

@@ -13,7 +13,7 @@ from .choose import Minimum, Problem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
 from .correspondences import Correspondences, checked_map, gather, spread_sample
 from .notes import remarks
-from .propose import LADDER, distinct, propose
+from .propose import distinct, ladder, propose
 from .refine import evaluate
 from .result import Start
 from .triangulate import ranges
@@ -28,7 +28,7 @@ MIN_EXTENT_PX = 2.0
 
 
 def search_start(
-    q: NDArray[np.float64],
+    q: NDArray[np.floating],
     camera: CameraModel,
     projector: ProjectorModel,
     size: tuple[int, int],
@@ -63,7 +63,7 @@ def search_start(
     say = progress or (lambda _: None)
     rng = np.random.default_rng(seed)
     q = checked_map(q, camera)
-    focals, bounds = _focals(projector, size, refine_focal, focal_guess)
+    _check_focal(projector, refine_focal, focal_guess)
 
     say("clean the map")
     usable = clean_map(q)
@@ -74,6 +74,7 @@ def search_start(
     many = spread_sample(data, FINISH_POINTS, camera.width, rng)
 
     say("propose poses")
+    focals, bounds = _focals(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
     say("refine candidates")
     problem = Problem(projector, refine_focal, bounds, noise_scale(q, usable))
@@ -134,10 +135,7 @@ def _triangulated(
     return used.reshape(shape), depth.reshape(shape)
 
 
-def _focals(
-    projector: ProjectorModel, size: tuple[int, int], refine_focal: bool, guess: float | None
-) -> tuple[NDArray[np.float64], tuple[float, float]]:
-    """Return the focal lengths to propose and the bounds that the refinement must respect."""
+def _check_focal(projector: ProjectorModel, refine_focal: bool, guess: float | None) -> None:
     given = projector.focal if guess is None else guess
     needed = guess is not None or not refine_focal
     if needed and (given is None or not (np.isfinite(given) and given > 0)):
@@ -145,9 +143,19 @@ def _focals(
             f"focal length {given} is not a positive number",
             todo="give it in pattern pixels, or let the search find it",
         )
+
+
+def _focals(
+    projector: ProjectorModel,
+    width: int,
+    data: Correspondences,
+    refine_focal: bool,
+    guess: float | None,
+) -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Return the focal lengths to propose and the bounds that the refinement must respect."""
     if not refine_focal:
-        return np.array([given]), (0.0, np.inf)
-    ladder = LADDER * size[0]
+        return np.array([projector.focal if guess is None else guess]), (0.0, np.inf)
+    focals = ladder(projector, width, data)
     if guess is not None:
-        ladder = np.append(ladder, guess)
-    return ladder, (ladder.min() / 2, ladder.max() * 2)
+        focals = np.append(focals, guess)
+    return focals, (focals.min() / 2, focals.max() * 2)

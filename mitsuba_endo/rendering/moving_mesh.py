@@ -1,0 +1,36 @@
+"""A mesh whose vertices the solver moves."""
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from . import keys
+
+
+class MovingMesh:
+    """One triangle mesh in a scene of its own; loaded once, because reloading scenes leaks."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        mesh: Any = mi.Mesh(keys.SURFACE, len(vertices), len(faces))
+        parameters = mi.traverse(mesh)
+        parameters[keys.FACES] = faces.astype(np.uint32).ravel()
+        parameters[keys.VERTEX_POSITIONS] = vertices.astype(np.float32).ravel()
+        parameters.update()
+        self._scene: Any = mi.load_dict({"type": "scene", keys.SURFACE: mesh})
+        self._parameters = mi.traverse(self._scene)
+        self._key = keys.vertex_positions()
+
+    def move(self, vertices: NDArray[np.float64]) -> None:
+        """Set the (V, 3) vertex positions and rebuild the acceleration structure."""
+        self._parameters[self._key] = vertices.astype(np.float32).ravel()
+        self._parameters.update()
+
+    def cast(self, origin: Any, direction: Any) -> tuple[Any, Any]:
+        """Return (triangle index, hit) of rays given as Dr.Jit vectors of any precision."""
+        ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+        found = self._scene.ray_intersect_preliminary(ray, coherent=True)
+        hit = found.is_valid()
+        return dr.select(hit, found.prim_index, 0), hit

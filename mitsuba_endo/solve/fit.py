@@ -1,0 +1,26 @@
+"""One fit: the problem under one projector law, solved."""
+
+from dataclasses import dataclass
+
+from ..records.correspondence import CorrespondenceMap
+from ..records.solution import LeftOut
+from .optimum import Optimum
+from .problem import Problem
+from .uncertainty import Uncertainty
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What a solver found under one law."""
+
+    law: str
+    maps: list[CorrespondenceMap]
+    """The frames that are part of it."""
+    left_out: list[LeftOut]
+    problem: Problem
+    optimum: Optimum
+    uncertainty: Uncertainty
+    notes: list[str]
+    """From the start: what the user should know."""
+    timings: dict[str, float]
+    """Seconds of every stage."""

@@ -1,0 +1,137 @@
+"""Levenberg-Marquardt on the rendered projector coordinates."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records.calibration import TraceRow
+from ..records.solution import Outcome
+from .normal import NormalEquations
+from .objective import Evaluation, Objective, estimate_noise, evaluate
+from .optimum import Optimum, make_optimum
+from .state import State, shared_focal
+from .stepping import apply_step
+
+_FIRST_DAMPING = 1e-4
+_DAMPING_RANGE = (1e-10, 1e-6)
+"""Least damping, and the least that a rejected step leads to."""
+_LOOSE = 10.0
+"""Factor of the tolerance in the first stage."""
+_TRIES = 8
+"""Steps tried in one iteration before it counts as stalled."""
+
+
+@dataclass(eq=False)
+class GaussNewton:
+    """The optimiser: :meth:`init`, then :meth:`step` until it says how it ended."""
+
+    objective: Objective
+    tolerance: float
+    """Step, in standard deviations of the unknowns, below which a stage has converged."""
+    max_iterations: int
+    on_iteration: Callable[[TraceRow, State], None] | None = None
+    trace: list[TraceRow] = field(default_factory=list)
+
+    def run(self, state: State) -> Optimum:
+        """Optimise from ``state`` until the steps are small."""
+        self.init(state)
+        outcome = None
+        try:
+            while outcome is None:
+                outcome = self.step()
+        except KeyboardInterrupt:
+            if not self.trace:
+                raise
+            outcome = Outcome.INTERRUPTED
+        return make_optimum(outcome, self.objective, self._now, self.trace)
+
+    def init(self, state: State) -> None:
+        """Evaluate the starting state."""
+        self._began = time.perf_counter()
+        self._mu = _FIRST_DAMPING
+        self._now = evaluate(self.objective.problem, state)
+        self.objective.sigma = estimate_noise(self._now)
+
+    def step(self) -> Outcome | None:
+        """Make one iteration; return how the optimisation ended, or None to go on."""
+        if len(self.trace) >= self.max_iterations:
+            return Outcome.MAX_ITERATIONS
+        accepted, size = self._descend(self.objective.normal_equations(self._now))
+        self._record(size)
+        # The first stage only leads to the last one, whose optimum is another.
+        settled = size < self.tolerance * (_LOOSE if self.objective.stage == 0 else 1.0)
+        if not accepted and not settled:
+            return self._leave_stage(Outcome.STALLED)
+        steady = self.objective.follow(self._now)
+        return self._leave_stage(Outcome.CONVERGED) if settled and steady else None
+
+    def _leave_stage(self, outcome: Outcome) -> Outcome | None:
+        return None if self.objective.next_stage(self._now) else outcome
+
+    def _descend(self, normal: NormalEquations) -> tuple[bool, float]:
+        """Raise the damping until a step lowers the cost; return success and the step's size."""
+        problem = self.objective.problem
+        cost = self.objective.cost(self._now)
+        size = np.inf
+        for _ in range(_TRIES):
+            try:
+                surfaces, step = normal.solve(self._mu)
+            except np.linalg.LinAlgError:
+                self._raise_damping()
+                continue
+            size = self._size(normal, surfaces, step)
+            trial = evaluate(problem, apply_step(problem.plan, self._now.state, surfaces, step))
+            if self.objective.cost(trial) <= cost:
+                self._now = trial
+                self._mu = max(self._mu / 10, _DAMPING_RANGE[0])
+                return True, size
+            if size < self.tolerance:
+                return False, size  # at the bottom, where rounding decides
+            self._raise_damping()
+        return False, size
+
+    def _raise_damping(self) -> None:
+        self._mu = max(self._mu * 10, _DAMPING_RANGE[1])
+
+    def _size(
+        self,
+        normal: NormalEquations,
+        surfaces: list[NDArray[np.float64]],
+        step: NDArray[np.float64],
+    ) -> float:
+        """Return a step's size in standard deviations of the unknowns.
+
+        For the global unknowns x it is sqrt(x^T S x / G) / sigma with the Schur complement S; of
+        the surfaces half the vertices count: some at depth steps never settle, and do not matter.
+        """
+        parts = [0.0]
+        if len(step):
+            parts.append(float(np.sqrt(max(step @ normal.schur @ step, 0.0) / len(step))))
+        for x, block in zip(surfaces, normal.surfaces, strict=True):
+            parts.append(float(np.median(np.abs(x) * np.sqrt(block.A.diagonal()))))
+        return max(parts) / self.objective.sigma
+
+    def _record(self, size: float) -> None:
+        row = trace_row(self.objective, self._now, len(self.trace) + 1, self._began, size, self._mu)
+        self.trace.append(row)
+        if self.on_iteration is not None:
+            self.on_iteration(row, self._now.state)
+
+
+def trace_row(
+    objective: Objective, at: Evaluation, iteration: int, began: float, size: float, damping: float
+) -> TraceRow:
+    """Describe an iteration that began at ``began`` (``time.perf_counter``)."""
+    problem = objective.problem
+    return TraceRow(
+        iteration=iteration,
+        seconds=time.perf_counter() - began,
+        cost=objective.cost(at) / max(problem.observations, 1) / objective.sigma**2,
+        focal=shared_focal(problem.plan.blocks["focal"], at.state),
+        damping=damping,
+        scale_px=objective.scale,
+        step=size,
+    )

@@ -1,0 +1,243 @@
+"""Projector coordinates R(S, C, P) rendered per pixel, and their derivatives by Dr.Jit.
+
+Mitsuba casts the camera's rays; which triangle a pixel sees is held fixed while the coordinate of
+the hit point is differentiated. Every parameter is copied per pixel, so that one backward pass for
+u and one for v give every pixel's row of the Jacobian. No derivative is written by hand.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import drjit
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.laws import projector_model
+from ..rendering.moving_mesh import MovingMesh
+from .lattice import Lattice
+from .plan import SIZES
+from .state import INTRINSICS, State
+
+# Their members depend on the active variant, so they have no static types.
+dr: Any = drjit
+mi: Any = mitsuba
+
+
+class SurfaceScene:
+    """A lattice surface in Mitsuba, with the constants that its derivatives need."""
+
+    def __init__(self, lattice: Lattice) -> None:
+        self.lattice = lattice
+        self.directions = _vector(lattice.directions)
+        self.faces = [mi.UInt32(np.ascontiguousarray(lattice.faces[:, i])) for i in range(3)]
+        self._mesh = MovingMesh(lattice.directions, lattice.faces)
+
+    def move(self, rho: NDArray[np.float64]) -> None:
+        """Place the vertices at inverse ranges (V,)."""
+        self._mesh.move(self.lattice.vertices(rho))
+
+    def cast(self, origin: Any, direction: Any) -> tuple[Any, Any]:
+        """Return (triangle index, hit) of rays given as double Dr.Jit vectors."""
+        return self._mesh.cast(origin, direction)
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """First-order model of one frame's rendered coordinates; rows are the frame's pixels."""
+
+    q: NDArray[np.float64]
+    """(2, N) rendered coordinates, pattern pixels."""
+    hit: NDArray[np.bool_]
+    """(N,) pixels whose ray meets the surface in front of the projector."""
+    triangles: NDArray[np.int64]
+    """(N, 3) vertices that the pixel's hit point depends on."""
+    J_surface: NDArray[np.float64]
+    """(2, 3, N) derivatives with respect to the inverse ranges of these vertices."""
+    J_local: NDArray[np.float64]
+    """(2, L, N) derivatives with respect to the frame's active blocks, in the plan's order."""
+
+
+@dataclass(eq=False)
+class FrameRenderer:
+    """Renders and linearises the coordinates of one frame."""
+
+    scene: SurfaceScene
+    rays: NDArray[np.float64]
+    """(N, 3) unit camera rays."""
+    law: str
+    at_centre: bool
+    """Whether the camera stays at the lattice's centre: its rays then never change triangle."""
+    _direction: Any = field(init=False, repr=False)
+    _cached: Any = field(init=False, default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        self._direction = _vector(self.rays)
+
+    def render(
+        self, state: State, frame: int, surface: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return (2, N) coordinates, (N,) ranges, (N, 3) vertices of the triangles, (N,) hits."""
+        u, v, hit, triangle, distance = self._trace(state, frame, surface, None, {})
+        dr.eval(u, v, hit, triangle, distance)
+        vertices = np.stack([t.numpy() for t in triangle], 1).astype(np.int64)
+        return np.stack([u.numpy(), v.numpy()]), distance.numpy(), vertices, hit.numpy()
+
+    def linearise(
+        self, state: State, frame: int, surface: int, active: Sequence[str], terms: int
+    ) -> Linearisation:
+        """Return coordinates and Jacobians with respect to surface and ``active`` blocks."""
+        widths = {name: terms if name == "distortion" else SIZES[name] for name in active}
+        columns: list[list[Any]] = []
+        for component in (0, 1):
+            # Tracing twice costs Python time only: Dr.Jit merges the equal parts in one kernel.
+            lanes = [dr.zeros(mi.Float64, len(self.rays)) for _ in range(3 + sum(widths.values()))]
+            dr.enable_grad(lanes)
+            u, v, hit, triangle, _ = self._trace(
+                state, frame, surface, lanes[:3], _split(lanes[3:], widths)
+            )
+            dr.backward(dr.select(hit, (u, v)[component], 0.0))
+            columns.append([dr.grad(lane) for lane in lanes])
+        u, v = dr.detach(u), dr.detach(v)
+        dr.eval(u, v, hit, triangle, columns)
+        J = np.array([[c.numpy() for c in row] for row in columns])
+        return Linearisation(
+            np.stack([u.numpy(), v.numpy()]),
+            hit.numpy(),
+            np.stack([t.numpy() for t in triangle], 1).astype(np.int64),
+            J[:, :3],
+            J[:, 3:],
+        )
+
+    def cost_gradient(
+        self,
+        state: State,
+        frame: int,
+        surface: int,
+        active: Sequence[str],
+        terms: int,
+        q: NDArray[np.float64],
+        loss: Callable[[Any], Any],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the gradient of sum loss(|R - q|^2) by one backward pass.
+
+        Args:
+            state: where.
+            frame: index of the frame.
+            surface: index of the surface that it sees.
+            active: its blocks of unknowns.
+            terms: number of distortion coefficients that are unknowns.
+            q: (2, N) observed coordinates.
+            loss: of squared residuals, on Dr.Jit arrays.
+
+        Returns:
+            (V,) with respect to the inverse ranges and (L,) to the active blocks.
+        """
+        widths = {name: terms if name == "distortion" else SIZES[name] for name in active}
+        offset = dr.zeros(mi.Float64, self.scene.lattice.size)
+        shared = [mi.Float64(0.0) for _ in range(sum(widths.values()))]
+        dr.make_opaque(shared)
+        dr.enable_grad(offset, shared)
+        u, v, hit, _, _ = self._trace(state, frame, surface, offset, _split(shared, widths))
+        du, dv = u - mi.Float64(q[0]), v - mi.Float64(q[1])
+        dr.backward(dr.sum(dr.select(hit, loss(du * du + dv * dv), 0.0)))
+        local = np.array([dr.grad(x).numpy()[0] for x in shared])
+        return dr.grad(offset).numpy(), local
+
+    def _trace(
+        self, state: State, frame: int, surface: int, d_rho: Any, d: dict[str, list[Any]]
+    ) -> tuple[Any, Any, Any, list[Any], Any]:
+        """Trace u, v, the hit mask, the vertices of the triangle seen and the range.
+
+        ``d_rho`` and ``d`` hold offsets, zero in value, of the inverse ranges and of the blocks;
+        their derivatives are those with respect to the parameters. Offsets of inverse ranges are
+        three lists over pixels, or one array over vertices.
+        """
+        camera = state.world_from_camera[frame]
+        origin, w = _constant(camera.t), _rotation(camera.R) @ self._direction
+        prim, hit = self._seen(origin, w)
+        triangle = [dr.gather(mi.UInt32, face, prim, hit) for face in self.scene.faces]
+        rho = mi.Float64(state.rho[surface])
+        corners = []
+        for i, vertex in enumerate(triangle):
+            inverse = dr.gather(mi.Float64, rho, vertex, hit)
+            if isinstance(d_rho, list):
+                inverse = inverse + d_rho[i]
+            elif d_rho is not None:
+                inverse = inverse + dr.gather(mi.Float64, d_rho, vertex, hit)
+            corners.append(dr.gather(mi.Vector3d, self.scene.directions, vertex, hit) / inverse)
+        if "camera_pose" in d:
+            turn, shift = _halves(d["camera_pose"])
+            w = w + dr.cross(turn, w)
+            origin = origin + shift
+        normal = dr.cross(corners[1] - corners[0], corners[2] - corners[0])
+        distance = dr.dot(normal, corners[0] - origin) / dr.dot(normal, w)
+        u, v, front = self._project(state, frame, distance, d)
+        return u, v, hit & front, triangle, distance
+
+    def _seen(self, origin: Any, w: Any) -> tuple[Any, Any]:
+        if not self.at_centre:
+            return self.scene.cast(origin, w)
+        if self._cached is None:
+            self._cached = self.scene.cast(origin, w)
+            dr.eval(self._cached)
+        return self._cached
+
+    def _project(
+        self, state: State, frame: int, distance: Any, d: dict[str, list[Any]]
+    ) -> tuple[Any, Any, Any]:
+        """Project the points ``distance`` along the camera rays into the pattern."""
+        pose = state.projector_from_camera[frame]
+        turned = _rotation(pose.R) @ self._direction
+        t = _constant(pose.t)
+        if "projector_pose" in d:
+            turn, shift = _halves(d["projector_pose"])
+            turned = turned + dr.cross(turn, turned)
+            t = t + shift
+        # Laws ignore the length of their argument; dividing by the distance keeps it near one.
+        Y = turned + t / distance
+        front = Y.z > 0
+        values = [mi.Float64(x) for x in state.intrinsics[frame]]
+        dr.make_opaque(values)
+        for name, place in INTRINSICS.items():
+            for offset, lane in enumerate(d.get(name, ())):
+                values[place.start + offset] = values[place.start + offset] + lane
+        distorted = "distortion" in d or np.any(state.intrinsics[frame][INTRINSICS["distortion"]])
+        model = projector_model(
+            self.law, dr.exp(values[0]), values[1:3], dr.exp(values[3]),
+            values[4:9] if distorted else (),
+        )  # fmt: skip
+        u, v = model.project_xyz(Y.x, Y.y, dr.select(front, Y.z, 1.0))
+        return u, v, front
+
+
+def _split(lanes: list[Any], widths: dict[str, int]) -> dict[str, list[Any]]:
+    out, start = {}, 0
+    for name, width in widths.items():
+        out[name] = lanes[start : start + width]
+        start += width
+    return out
+
+
+def _halves(six: Sequence[Any]) -> tuple[Any, Any]:
+    return mi.Vector3d(*six[:3]), mi.Vector3d(*six[3:])
+
+
+def _vector(values: NDArray[np.float64]) -> Any:
+    """Return an (N, 3) array as a Dr.Jit vector."""
+    return mi.Vector3d(*(np.ascontiguousarray(values[:, i], np.float64) for i in range(3)))
+
+
+def _constant(values: NDArray[np.float64]) -> Any:
+    """Return a (3,) vector that is not compiled into the kernel."""
+    vector = mi.Vector3d(*(mi.Float64(float(x)) for x in values))
+    dr.make_opaque(vector)
+    return vector
+
+
+def _rotation(R: NDArray[np.float64]) -> Any:
+    """Return a (3, 3) rotation that is not compiled into the kernel."""
+    matrix = mi.Matrix3d(R.tolist())
+    dr.make_opaque(matrix)
+    return matrix

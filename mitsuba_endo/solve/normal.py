@@ -1,0 +1,149 @@
+"""Normal equations, sparse over surface vertices and dense over the global unknowns.
+
+With surface blocks A_s, their coupling B_s to the global unknowns and the global block D, the
+surfaces are eliminated: S = D - sum_s B_s^T A_s^-1 B_s (Schur complement), S dx = reduced
+gradient, then the surfaces follow by back-substitution.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .banded import BandedCholesky
+from .linearise import Linearisation
+
+
+@dataclass(eq=False)
+class SurfaceBlock:
+    """Part of the normal equations that belongs to one surface."""
+
+    A: sp.csr_array
+    """(V, V) Hessian of data and prior."""
+    B: NDArray[np.float64]
+    """(V, G) coupling to the global unknowns."""
+    g: NDArray[np.float64]
+    """(V,) gradient."""
+    bandwidth: int
+
+    def damped(self, mu: float) -> BandedCholesky:
+        """Factorise A + mu diag(A)."""
+        diagonal = self.A.diagonal()
+        # A vertex without data or neighbours would make A singular.
+        floor = 1e-12 * diagonal.max(initial=1.0)
+        return BandedCholesky.of(
+            self.A + sp.diags_array(mu * diagonal + floor, format="csr"), self.bandwidth
+        )
+
+
+@dataclass(eq=False)
+class NormalEquations:
+    """Gauss-Newton approximation of the robust cost around a state."""
+
+    surfaces: list[SurfaceBlock]
+    D: NDArray[np.float64]
+    """(G, G) Hessian of the global unknowns."""
+    g: NDArray[np.float64]
+    """(G,) gradient."""
+    schur: NDArray[np.float64] = field(init=False)
+    """(G, G) Schur complement of the last :meth:`solve`."""
+
+    @classmethod
+    def empty(cls, sizes: list[int], bandwidths: list[int], columns: int) -> "NormalEquations":
+        blocks = [
+            SurfaceBlock(sp.csr_array((n, n)), np.zeros((n, columns)), np.zeros(n), width)
+            for n, width in zip(sizes, bandwidths, strict=True)
+        ]
+        return cls(blocks, np.zeros((columns, columns)), np.zeros(columns))
+
+    def add_frame(
+        self,
+        surface: int,
+        lin: Linearisation,
+        residual: NDArray[np.float64],
+        weight: NDArray[np.float64],
+        chart: NDArray[np.float64],
+    ) -> None:
+        """Add one frame.
+
+        Args:
+            surface: index of the surface that the frame sees.
+            lin: its linearisation of N pixels.
+            residual: (2, N) rendered minus observed coordinates, zero where the weight is.
+            weight: (N,) robust weights.
+            chart: (L, G) from global steps to the frame's local ones.
+        """
+        root = np.sqrt(weight)
+        rows = surface_rows(lin, root, len(self.surfaces[surface].g))
+        local = (lin.J_local * root).transpose(1, 0, 2).reshape(len(chart), -1)
+        r = (residual * root).ravel()
+        block = self.surfaces[surface]
+        block.A = block.A + rows.T @ rows
+        block.B += (rows.T @ local.T) @ chart
+        block.g += rows.T @ r
+        self.D += chart.T @ (local @ local.T) @ chart
+        self.g += chart.T @ (local @ r)
+
+    def add_global(self, hessian: NDArray[np.float64], gradient: NDArray[np.float64]) -> None:
+        """Add a term over global unknowns only."""
+        self.D += hessian
+        self.g += gradient
+
+    def solve(self, mu: float) -> tuple[list[NDArray[np.float64]], NDArray[np.float64]]:
+        """Return the steps of the surfaces and of the global unknowns under damping ``mu``.
+
+        Raises:
+            numpy.linalg.LinAlgError: the damped system is not positive definite.
+        """
+        reduced = self.reduce(mu)
+        self.schur = reduced.S
+        S = reduced.S + mu * np.diag(np.diag(self.D))
+        step = -_solve_symmetric(S, reduced.g)
+        surfaces = [-(x[:, -1] + x[:, :-1] @ step) for x in reduced.eliminated]
+        return surfaces, step
+
+    def reduce(self, mu: float = 0.0) -> "Reduced":
+        """Eliminate the surfaces."""
+        S, g = self.D.copy(), self.g.copy()
+        factors, eliminated = [], []
+        for block in self.surfaces:
+            factor = block.damped(mu)
+            x = factor.solve(np.column_stack([block.B, block.g]))
+            S -= block.B.T @ x[:, :-1]
+            g -= block.B.T @ x[:, -1]
+            factors.append(factor)
+            eliminated.append(x)
+        return Reduced((S + S.T) / 2, g, factors, eliminated)
+
+
+@dataclass(eq=False)
+class Reduced:
+    """The normal equations after elimination of the surfaces."""
+
+    S: NDArray[np.float64]
+    """(G, G) Schur complement."""
+    g: NDArray[np.float64]
+    """(G,) reduced gradient."""
+    factors: list[BandedCholesky]
+    eliminated: list[NDArray[np.float64]]
+    """A^-1 [B, g] of every surface, (V, G + 1)."""
+
+
+def surface_rows(lin: Linearisation, root: NDArray[np.float64], vertices: int) -> sp.csr_array:
+    """Return the (2 N, V) Jacobian of u then v over one surface, rows scaled by ``root`` (N,)."""
+    n = len(root)
+    values = (lin.J_surface * root).transpose(0, 2, 1).ravel()
+    columns = np.concatenate([lin.triangles, lin.triangles]).ravel()
+    return sp.csr_array((values, columns, np.arange(0, 6 * n + 1, 3)), (2 * n, vertices))
+
+
+def _solve_symmetric(S: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve S x = g after scaling the diagonal to one; directions without information stay put."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(S), 1e-300))
+    values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
+    if values[-1] <= 0:
+        raise np.linalg.LinAlgError("no information")
+    keep = values > 1e-12 * values[-1]
+    inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
+    return scale * (vectors @ (inverse * (vectors.T @ (scale * g))))

@@ -1,0 +1,32 @@
+"""How to solve, as opposed to what is known (the rig) and what was seen (the maps)."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of :func:`mitsuba_endo.solve.calibrate.calibrate`."""
+
+    solver: Literal["gauss-newton", "adam"] = "gauss-newton"
+    """``gauss-newton`` (Levenberg-Marquardt), or the published first-order ``adam``."""
+    start: Literal["search", "plane"] = "search"
+    """``search`` needs no guess; ``plane`` is the published plane and front-parallel projector."""
+    plane_distance: float = 10.0
+    """Distance of the starting plane, in baselines (start = plane)."""
+    max_iterations: int = 60
+    """Limit for Gauss-Newton."""
+    adam_iterations: int = 3000
+    """Limit for Adam."""
+    tolerance: float = 0.05
+    """Converged when a step is below this many standard deviations of the unknowns."""
+    cell_px: float | None = None
+    """Size of a surface cell, camera pixels; default: chosen from the number of observations."""
+    smoothness: float = 1.0
+    """Weight of the prior on the surface's curvature, in units of its own estimate."""
+    finish: Literal["tukey", "cauchy"] = "tukey"
+    """Loss of the last stage: redescending, or Cauchy as published."""
+    seed: int = 0
+    """Of the random samples in the search for a start."""
+    jackknife: bool = True
+    """Whether to compute block-jackknife standard deviations."""
