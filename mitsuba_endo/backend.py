@@ -26,6 +26,7 @@ def use(*variants: str) -> str:
     Raises:
         InputError: Dr.Jit was imported before LLVM could be pointed out, or no usable LLVM.
     """
+    todo = _advice()
     locate_llvm()
     import mitsuba as mi
 
@@ -35,13 +36,11 @@ def use(*variants: str) -> str:
     try:
         mi.set_variant(*(variants or VARIANTS))
     except (ImportError, RuntimeError) as error:
-        raise InputError(
-            f"Mitsuba cannot start ({_first_line(error)})", todo="run `mitsuba-endo doctor`"
-        ) from error
+        raise InputError(f"Mitsuba cannot start ({_first_line(error)})", todo=todo) from error
     variant = mi.variant()
     assert variant is not None  # set_variant has just succeeded
     if variant.startswith("llvm"):
-        _check_llvm()
+        _check_llvm(todo)
     _set_threads()
     return variant
 
@@ -93,7 +92,14 @@ def _preload_libcxx() -> None:
                 return  # LLVM then says itself what it misses
 
 
-def _check_llvm() -> None:
+def _advice() -> str:
+    """Return what to do if Mitsuba does not start."""
+    if "drjit" in sys.modules and "DRJIT_LIBLLVM_PATH" not in os.environ:
+        return "call mitsuba_endo.backend.use() before anything imports mitsuba or drjit"
+    return "run `mitsuba-endo doctor`"
+
+
+def _check_llvm(todo: str) -> None:
     """Refuse an LLVM that would abort the process at the first minimum or clip."""
     import drjit as dr
 
@@ -102,7 +108,7 @@ def _check_llvm() -> None:
         raise InputError(
             f"LLVM {'.'.join(map(str, version))} is too old for Dr.Jit",
             "DRJIT_LIBLLVM_PATH",
-            "install LLVM 17 or newer and run `mitsuba-endo doctor`",
+            todo,
         )
 
 

@@ -59,3 +59,32 @@ def test_llvm_path_of_the_user_is_respected(monkeypatch: pytest.MonkeyPatch) -> 
     """Oracle: the environment variable."""
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", "/opt/llvm/libLLVM.so")
     assert str(backend.locate_llvm()) == "/opt/llvm/libLLVM.so"
+
+
+@pytest.mark.parametrize(
+    "module", ["mitsuba_endo.rendering.moving_mesh", "mitsuba_endo.solve.calibrate"]
+)
+def test_modules_may_be_imported_before_use(module: str) -> None:
+    """Importing a module that needs Dr.Jit must not let it pick another LLVM on the system."""
+    expected = run(
+        "from mitsuba_endo import backend; backend.use('llvm_ad_rgb')\n"
+        "import drjit; print(drjit.detail.llvm_version())"
+    )
+    done = run(
+        f"import {module}; from mitsuba_endo import backend; backend.use('llvm_ad_rgb')\n"
+        "import drjit; print(drjit.detail.llvm_version())"
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == expected.stdout != ""
+
+
+def test_drjit_imported_too_early_is_explained() -> None:
+    """Oracle: the advice that helps when Dr.Jit found no LLVM by itself."""
+    done = run(
+        "import os; os.environ.pop('DRJIT_LIBLLVM_PATH', None)\n"
+        "import drjit; drjit.detail.llvm_version = lambda: (15, 0, 6)\n"
+        "from mitsuba_endo import backend\n"
+        "backend.use('llvm_ad_rgb')"
+    )
+    assert done.returncode != 0
+    assert "before anything imports mitsuba or drjit" in done.stderr.splitlines()[-1]

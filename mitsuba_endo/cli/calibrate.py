@@ -121,10 +121,11 @@ def solve_and_write(
     """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
         from .. import backend
+
+        backend.use()
         from ..show.solution_folder import write_solution_folder
         from ..solve.calibrate import calibrate as solve
 
-        backend.use()
         result = solve(maps, rig, options, advance)
         advance(0.95, "Drawing pictures")
         return write_solution_folder(out, result, rig)

@@ -80,9 +80,9 @@ def _report(
     from .summary import comparison_table, metrics_table
 
     output.print(
-        f"An endoscope before a stomach wall, {SETTINGS['width']} x {SETTINGS['height']} pixels. Projector "
-        f"coordinates with {NOISE_PX} px noise and {100 * OUTLIERS:.0f} % outliers; focal length, "
-        "pose and surface unknown, the length of the baseline given.",
+        f"An endoscope before a stomach wall, {SETTINGS['width']} x {SETTINGS['height']} pixels. "
+        f"Projector coordinates with {NOISE_PX} px noise and {100 * OUTLIERS:.0f} % outliers; "
+        "focal length, pose and surface unknown, the length of the baseline given.",
         comparison_table(solution, truth),
         metrics_table(metrics),
         *solution.verdict,

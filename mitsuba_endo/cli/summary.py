@@ -24,6 +24,9 @@ METRICS = {
 """What of :class:`Metrics` is shown, with the unit."""
 
 
+_ROUNDING = 1e-12
+
+
 def solution_table(solution: "Solution") -> "Table":
     """List every unknown of the projector and every frame's baseline and residual, with units."""
     table = _table("Calibration", "Quantity", "Value", "Std", "Unit", "Status")
@@ -74,12 +77,12 @@ def _rotation_vector(R: np.ndarray) -> np.ndarray:
 
 
 def numbers(value: float | list[float] | None, digits: int = 6) -> str:
-    """Format a number or a list; ``-`` for what is not known."""
+    """Format a number or a list; ``-`` for what is not known, 0 for what is only rounding."""
     if value is None:
         return "-"
     if isinstance(value, list):
-        return ", ".join(f"{v:.{digits}g}" for v in value)
-    return f"{value:.{digits}g}"
+        return ", ".join(numbers(v, digits) for v in value)
+    return "0" if abs(value) < _ROUNDING else f"{value:.{digits}g}"
 
 
 def _listed(values: list[float] | list[None] | list[float | None]) -> str:
@@ -91,17 +94,17 @@ def _table(title: str, *columns: str) -> "Table":
     from rich.table import Table
 
     table = Table(title=title)
-    for column in columns:
-        table.add_column(column, overflow="fold")
+    for i, column in enumerate(columns):
+        table.add_column(column, overflow="fold", no_wrap=i == 0)
     return table
 
 
 def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     """Set what was found beside the truth, for the first frame."""
-    table = _table("Found and true", "Quantity", "Found", "Std", "True", "Unit")
+    table = _table("Projector, found and true", "Quantity", "Found", "Std", "True", "Unit")
     focal, true_focal = solution.projector.focal, truth.projector.focal
     table.add_row(
-        "projector focal length", numbers(focal.value), numbers(focal.std, 2),
+        "focal length", numbers(focal.value), numbers(focal.std, 2),
         numbers(true_focal.value), "pattern px",
     )  # fmt: skip
     found, true = (s.frames[0].projector_from_camera for s in (solution, truth))
@@ -111,10 +114,10 @@ def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
         R, R_true = (np.degrees(_rotation_vector(pose.R)).tolist() for pose in poses if pose)
         degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
         row = numbers(R, 4), _listed(degrees), numbers(R_true, 4), "deg"
-        table.add_row("projector rotation vector", *row)
+        table.add_row("rotation vector", *row)
         t, t_true = (pose.t.tolist() for pose in poses if pose)
         row = numbers(t, 4), _listed(std[3:]), numbers(t_true, 4), solution.units
-        table.add_row("projector translation", *row)
+        table.add_row("translation", *row)
     return table
 
 

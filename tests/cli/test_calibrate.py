@@ -1,0 +1,65 @@
+"""Parts of ``calibrate`` that need no solver."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitsuba_endo.cli.calibrate import exit_code, load_input, with_sharing
+from mitsuba_endo.records.rig import Rig
+from mitsuba_endo.records.solution import Outcome, Solution
+from tests.cli.inputs import q, rig, write
+
+
+@pytest.mark.parametrize(
+    ("outcome", "code"),
+    [
+        (Outcome.CONVERGED, 0),
+        (Outcome.MAX_ITERATIONS, 1),
+        (Outcome.STALLED, 1),
+        (Outcome.INTERRUPTED, 130),
+    ],
+)
+def test_exit_code(outcome: Outcome, code: int):
+    """Oracle: the table of exit codes in the help."""
+    solution = Solution.model_validate(
+        {
+            "outcome": outcome,
+            "units": "mm",
+            "scale": "baseline",
+            "projector": {
+                "law": "pinhole",
+                "focal": {"value": 1, "status": "measured"},
+                "centre": {"value": [1, 2], "status": "fixed"},
+            },
+            "frames": [
+                {
+                    "name": "a",
+                    "projector_from_camera": {"R": np.eye(3).tolist(), "t": [1, 0, 0]},
+                    "world_from_camera": {"R": np.eye(3).tolist(), "t": [0, 0, 0]},
+                }
+            ],
+        }
+    )
+    assert exit_code(solution) == code
+
+
+def test_share_changes_only_what_it_names():
+    """Oracle: the rig's own plan for the other blocks."""
+    before = Rig.model_validate({**rig(), "share": {"surface": "per_frame", "centre": "shared"}})
+    after = with_sharing(before, "projector_pose=shared, focal=fixed")
+    changed = {"projector_pose": "shared", "focal": "fixed"}
+    assert after.share.model_dump() == {**before.share.model_dump(), **changed}
+    assert after.camera == before.camera
+
+
+def test_maps_of_one_name_are_told_apart(tmp_path: Path):
+    """Oracle: the folders' names; the order is that of the command line."""
+    paths = []
+    for name, shift in (("b", 0.0), ("a", 1.5)):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name, map_data=q() + np.float32(shift))
+        paths.append(tmp_path / name / "map.npz")
+    maps, _ = load_input(paths, tmp_path / "a" / "rig.yaml")
+    assert [m.name for m in maps] == ["b/map.npz", "a/map.npz"]
+    assert maps[1].q[0, 0, 0] - maps[0].q[0, 0, 0] == 1.5
