@@ -95,6 +95,12 @@ def lopsided_camera(width: int = 320, height: int = 224) -> CameraModel:
     return CameraModel("opencv", width, height, K, (-0.12, 0.04, 0.001, -0.0015, 0.0))
 
 
+def lopsided_fisheye(width: int = 320, height: int = 224) -> CameraModel:
+    """A fisheye of about 160 degrees across, such as an endoscope's."""
+    K = np.array([[0.34 * width, 0, 0.47 * width], [0, 0.35 * width, 0.53 * height], [0, 0, 1]])
+    return CameraModel("opencv_fisheye", width, height, K, (0.02, -0.005, 0.0, 0.0))
+
+
 def cast(
     camera: CameraModel,
     projector: ProjectorModel,

@@ -23,9 +23,13 @@ from .vectors import Vectors
 
 LADDER = np.geomspace(1 / 3, 3, 12)
 """Focal lengths tried, over the projector's width."""
+ABOVE_LIMIT = (1.0, 1.05, 1.12)
+"""Focal lengths tried as well, over the smallest that the law allows: near it a projector that
+reaches 90 degrees changes its bearings faster than the ladder has rungs."""
 THRESHOLD_PX = 2.0
 RANSAC_ITERATIONS = 150
 SCORE_PX = 20.0
+_IN_RANGE = 0.99  # share of coordinates that must be possible; outliers may lie beyond
 _MIN_Z = 0.1  # of a unit direction: wider ones have no usable image on the plane z = 1
 
 
@@ -53,6 +57,27 @@ def propose(data: Correspondences, projector: ProjectorModel, focals: Vectors) -
     with ThreadPoolExecutor() as pool:
         found = pool.map(lambda f: _at_focal(data, projector.with_(focal=float(f))), focals)
         return sorted((p for proposals in found for p in proposals), key=lambda p: p.score)
+
+
+def ladder(projector: ProjectorModel, width: int, data: Correspondences) -> Vectors:
+    """Return the focal lengths to try, ascending, pattern pixels.
+
+    A law with a limited range (``direction_cosine``) has a smallest focal length at which the seen
+    coordinates still belong to a direction; rungs below it are useless and it gets its own.
+    """
+    rungs = LADDER * width
+
+    def reached(focal: float) -> bool:
+        seen = bearings(projector.with_(focal=focal), data.q)
+        return float(np.isfinite(seen.b[2]).mean()) > _IN_RANGE
+
+    if reached(rungs[0]):
+        return rungs
+    low, high = rungs[0], rungs[-1]
+    while high > 1.005 * low:
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if reached(middle) else (middle, high)
+    return np.sort(np.concatenate([rungs[rungs > high], high * np.array(ABOVE_LIMIT)]))
 
 
 def distinct(proposals: list[Proposal], count: int) -> list[Proposal]:

@@ -15,6 +15,7 @@ from tests.rigs import (
     bumpy_sheet,
     cast,
     lopsided_camera,
+    lopsided_fisheye,
     plane,
     random_rig,
     with_noise,
@@ -57,9 +58,9 @@ def _limits(rig, inliers):
     return np.sqrt(covariance[5, 5]), np.sqrt(covariance[3, 3] + covariance[4, 4])
 
 
-def _succeeds(seed):
+def _succeeds(seed, camera=None):
     """Find a random rig with up to 30 % outliers to 1 % and 2 degrees, or to four sigma."""
-    rig = random_rig(seed)
+    rig = random_rig(seed, camera)
     share = np.random.default_rng(1000 + seed).uniform(0, 0.3)
     try:
         start = _search(with_outliers(with_noise(rig, NOISE, seed), share, seed))
@@ -74,6 +75,19 @@ def _succeeds(seed):
 def test_finds_random_rigs():
     """Oracle: the rigs' truth (see ``_succeeds``)."""
     assert [seed for seed in range(200, 208) if not _succeeds(seed)] == []
+
+
+def test_finds_random_rigs_of_wide_cameras_and_projectors():
+    """Oracle: the rigs' truth (see ``_succeeds``); 3000 and 3021 light up to 90 degrees."""
+    camera = lopsided_fisheye()
+    assert [seed for seed in (3000, 3002, 3008, 3021) if not _succeeds(seed, camera)] == []
+
+
+@pytest.mark.slow
+def test_finds_99_of_100_fisheye_rigs():
+    """Oracle: the rigs' truth (see ``_succeeds``)."""
+    camera = lopsided_fisheye()
+    assert sum(_succeeds(seed, camera) for seed in range(3000, 3100)) >= 99
 
 
 @pytest.mark.slow
