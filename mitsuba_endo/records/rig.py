@@ -142,6 +142,9 @@ class Projector(Record):
     """fy / fx."""
     distortion: Annotated[list[float], Field(max_length=MAX_PROJECTOR_DISTORTION)] = []
     """k1, k2, p1, p2, k3 on the law's normalised coordinates, shorter lists allowed."""
+    grid_period: PositiveFloat | None = None
+    """Period of the pattern's grid, pattern pixels: lets slips of the decoder by whole periods be
+    told from other errors."""
     pose: Pose | None = None
     """Start for projector_from_camera, mm."""
 

@@ -2,12 +2,11 @@
 
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from . import keys
+from .untyped import dr, mi
 
 
 class MovingMesh:

@@ -9,22 +9,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import drjit
-import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
 from ..records.calibration import TraceRow
 from ..records.solution import Outcome
+from ..rendering.untyped import dr, mi
 from .gauss_newton import trace_row
 from .objective import Objective, estimate_noise, evaluate
 from .optimum import Optimum, make_optimum
 from .state import State
 from .stepping import apply_step
 
-# Their members depend on the active variant, so they have no static types.
-dr: Any = drjit
-mi: Any = mitsuba
 RATES = {"camera_pose": 1e-3, "projector_pose": 1e-3, "focal": 1e-3, "centre": 0.3,
          "aspect": 1e-3, "distortion": 1e-3}  # fmt: skip
 """First learning rates: radians and baselines for poses, relative for focal length and aspect."""

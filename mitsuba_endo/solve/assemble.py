@@ -36,7 +36,7 @@ from .options import Options
 from .plan import Plan
 from .scale import Unit, resolve_unit
 from .state import INTRINSICS
-from .surface_result import USED_WEIGHT, frame_maps, surface_estimate
+from .surface_result import USED_WEIGHT, frame_maps, render_frames, surface_estimate
 from .verdict import verdict
 
 
@@ -84,8 +84,8 @@ def assemble(
     Raises:
         InputError: the scale cannot be resolved.
     """
-    maps, ranges = frame_maps(fit, camera)
-    unit = resolve_unit(rig, camera, ranges)
+    renderings = render_frames(fit.optimum, camera)
+    unit = resolve_unit(rig, camera, [r.range for r in renderings])
     report = _report(fit, unit)
     surface = surface_estimate(fit, 0, unit.factor, _inflation(fit))
     solution = Solution(
@@ -107,7 +107,7 @@ def assemble(
         warnings=[*fit.notes, *(warnings or []), *_warnings(fit)],
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
-    return Calibration(solution, camera, surface, maps, fit.optimum.trace)
+    return Calibration(solution, camera, surface, frame_maps(fit, renderings), fit.optimum.trace)
 
 
 def _report(fit: Fit, unit: Unit) -> Report:
@@ -204,10 +204,8 @@ def _deviations(
 
 
 def _worst(report: Report, columns: range) -> Status:
-    order: list[Status] = ["measured", "weak", "unobservable"]
     deviations = np.sqrt(np.diag(report.covariance))
-    statuses = [status_of(float(deviations[i]), report.names[i].scale) for i in columns]
-    return max(statuses, key=order.index)
+    return status_of(max(float(deviations[i]) / report.names[i].scale for i in columns))
 
 
 def _frame(report: Report, k: int) -> Frame:

@@ -27,9 +27,10 @@ class BandedCholesky:
             numpy.linalg.LinAlgError: it is not positive definite.
         """
         coo = sp.coo_array(matrix)
+        size, _ = matrix.shape
         row, col = coo.coords
         lower = row >= col
-        band = np.zeros((bandwidth + 1, coo.shape[0]))
+        band = np.zeros((bandwidth + 1, size))
         band[row[lower] - col[lower], col[lower]] = coo.data[lower]
         return cls(scipy.linalg.cholesky_banded(band, lower=True, check_finite=False))
 

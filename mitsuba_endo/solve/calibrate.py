@@ -1,26 +1,17 @@
 """Calibration: from correspondence maps and a rig to projector, poses and surface."""
 
-import time
-
 from threadpoolctl import threadpool_limits
 
-from ..errors import InputError
-from ..geometry.cameras import CameraModel
 from ..geometry.laws import LAWS
 from ..records.calibration import Calibration
 from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import AUTO_LAW, Rig
-from ..start.known import known_start
-from ..start.plane import plane_start
-from ..start.result import Start
-from ..start.search import search_start
 from .assemble import assemble
-from .fit import Fit
+from .law_evidence import choose_law
 from .options import Options
-from .plan import make_plan
-from .run import Progress, fit
-from .single import separate_surfaces
+from .pipeline import Job, solve
+from .run import Progress
 
 
 def calibrate(
@@ -50,51 +41,15 @@ def calibrate(
     laws = list(LAWS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
-        fits = [_fit(law, maps, camera, rig, options, say) for law in laws]
+        fits = [
+            solve(Job(maps, camera, rig, law, options), _part(say, i, len(laws)))
+            for i, law in enumerate(laws)
+        ]
         say(0.9, "Assembling the solution")
-        return assemble(fits[0], camera, rig, options)
+        fit, evidence, warnings = choose_law(fits)
+        return assemble(fit, camera, rig, options, evidence, warnings)
 
 
-def _fit(
-    law: str,
-    maps: list[CorrespondenceMap],
-    camera: CameraModel,
-    rig: Rig,
-    options: Options,
-    say: Progress,
-) -> Fit:
-    began = time.perf_counter()
-    say(0.05, "Searching for a start")
-    starts = [start_frame(m, camera, rig, law, options) for m in maps]
-    timings = {"start": time.perf_counter() - began}
-    say(0.4, "Optimising")
-    plan = make_plan(rig, len(maps))
-    problem, state = separate_surfaces(maps, starts, camera, plan, law, options)
-    notes = [note for s in starts for note in s.notes]
-    return fit(problem, state, maps, options, notes=notes, timings=timings)
-
-
-def start_frame(
-    map_: CorrespondenceMap, camera: CameraModel, rig: Rig, law: str, options: Options
-) -> Start:
-    """Return the start of one frame by the method that options and rig ask for.
-
-    A pose in the rig is taken as the start; else the options decide.
-
-    Raises:
-        InputError: no start can be found; names the map.
-    """
-    projector = rig.projector.to_model(law)
-    given = rig.projector.pose
-    try:
-        if given is not None and rig.projector.focal.value is not None:
-            return known_start(map_.q, camera, projector, given.to_transform())
-        if options.start == "plane":
-            return plane_start(map_.q, camera, projector, distance=options.plane_distance)
-        return search_start(
-            map_.q, camera, projector, (rig.projector.width, rig.projector.height),
-            refine_focal=rig.projector.focal.refine, focal_guess=rig.projector.focal.value,
-            seed=options.seed,
-        )  # fmt: skip
-    except InputError as error:
-        raise InputError(error.what, error.where or map_.name, error.todo) from error
+def _part(say: Progress, index: int, parts: int) -> Progress:
+    """Return a progress callback that fills one part of the first nine tenths."""
+    return lambda share, step: say(0.9 * (index + share) / parts, step)

@@ -16,7 +16,7 @@ from .state import State, shared_focal
 from .stepping import apply_step
 
 _FIRST_DAMPING = 1e-4
-_DAMPING_RANGE = (1e-10, 1e-6)
+_DAMPING_RANGE = (1e-10, 1e-4)
 """Least damping, and the least that a rejected step leads to."""
 _LOOSE = 10.0
 """Factor of the tolerance in the first stage."""

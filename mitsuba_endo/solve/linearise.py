@@ -9,20 +9,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import drjit
-import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.laws import projector_model
 from ..rendering.moving_mesh import MovingMesh
+from ..rendering.untyped import dr, mi
 from .lattice import Lattice
 from .plan import SIZES
 from .state import INTRINSICS, State
-
-# Their members depend on the active variant, so they have no static types.
-dr: Any = drjit
-mi: Any = mitsuba
 
 
 class SurfaceScene:

@@ -80,11 +80,11 @@ def unknowns(plan: Plan, state: State) -> list[Unknown]:
     return out
 
 
-def status_of(std: float, scale: float = 1.0) -> Status:
-    """Return how well an unknown with standard deviation ``std`` is determined."""
-    if not std < UNOBSERVABLE * scale:
+def status_of(std: float) -> Status:
+    """Return how well an unknown with standard deviation ``std``, in natural scales, is known."""
+    if not std < UNOBSERVABLE:
         return "unobservable"
-    return "weak" if std >= WEAK * scale else "measured"
+    return "weak" if std >= WEAK else "measured"
 
 
 def free_directions(

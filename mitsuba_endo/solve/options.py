@@ -12,13 +12,16 @@ class Options:
     """``gauss-newton`` (Levenberg-Marquardt), or the published first-order ``adam``."""
     start: Literal["search", "plane"] = "search"
     """``search`` needs no guess; ``plane`` is the published plane and front-parallel projector."""
+    cameras: Literal["registration", "identity"] = "registration"
+    """Start of the camera poses of several frames: registration of the surfaces that each frame
+    alone shows, or all cameras at the same place."""
     plane_distance: float = 10.0
     """Distance of the starting plane, in baselines (start = plane)."""
     max_iterations: int = 60
     """Limit for Gauss-Newton."""
     adam_iterations: int = 3000
     """Limit for Adam."""
-    tolerance: float = 0.05
+    tolerance: float = 0.1
     """Converged when a step is below this many standard deviations of the unknowns."""
     cell_px: float | None = None
     """Size of a surface cell, camera pixels; default: chosen from the number of observations."""

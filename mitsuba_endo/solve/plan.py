@@ -94,7 +94,7 @@ class Plan:
             slot = self.slot(name, frame)
             assert slot is not None
             block = np.zeros((self.local_width(name), self.columns))
-            block[:, slot] = self._chart(state, name, frame)
+            block[:, slot] = self.chart(state, name, frame)
             rows.append(block)
         return np.concatenate(rows) if rows else np.zeros((0, self.columns))
 
@@ -103,13 +103,14 @@ class Plan:
     ) -> NDArray[np.float64] | None:
         """Return the local step of a block for a global one, or None where it is fixed."""
         slot = self.slot(name, frame)
-        return None if slot is None else self._chart(state, name, frame) @ step[slot]
+        return None if slot is None else self.chart(state, name, frame) @ step[slot]
 
     def local_width(self, name: str) -> int:
         """Return the number of local columns of a block."""
         return self.distortion_terms if name == "distortion" else SIZES[name]
 
-    def _chart(self, state: State, name: str, frame: int) -> NDArray[np.float64]:
+    def chart(self, state: State, name: str, frame: int) -> NDArray[np.float64]:
+        """Return the (local width, global width) derivative of a block's local step."""
         if not self.holds_length(name, self.owner(name, frame)):
             return np.eye(self.local_width(name))
         chart = np.zeros((6, 5))

@@ -61,18 +61,18 @@ class CurvaturePrior:
 
 
 def curvature_prior(
-    lattice: Lattice, observations: int, disparity: float, smoothness: float
+    lattice: Lattice, density: float, disparity: float, smoothness: float
 ) -> CurvaturePrior:
     """Build the prior of a lattice.
 
     Args:
         lattice: the surface.
-        observations: number of correspondences of one frame that sees it.
+        density: correspondences of one frame per vertex that it sees.
         disparity: focal length times baseline, which turns inverse range into pattern pixels.
         smoothness: multiplies the default weight.
     """
     operator = (lattice.second_differences() * disparity).tocsr()
-    return CurvaturePrior(operator, smoothness * observations / lattice.size)
+    return CurvaturePrior(operator, smoothness * density)
 
 
 @dataclass(eq=False)

@@ -33,7 +33,8 @@ def separate_surfaces(
         lattice, inverse = _surface(frame, start, camera, options.cell_px)
         disparity = float(start.projector.focal * np.linalg.norm(start.projector_from_camera.t))
         lattices.append(lattice)
-        priors.append(curvature_prior(lattice, len(frame.rays), disparity, options.smoothness))
+        density = len(frame.rays) / lattice.size
+        priors.append(curvature_prior(lattice, density, disparity, options.smoothness))
         rho.append(inverse)
     state = State(
         rho,

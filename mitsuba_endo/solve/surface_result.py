@@ -1,5 +1,7 @@
 """From the optimum to images and the surface that people look at."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,7 @@ from ..geometry.cameras import CameraModel
 from ..records.calibration import FrameMaps, SurfaceEstimate
 from .fit import Fit
 from .linearise import FrameRenderer
+from .optimum import Optimum
 
 USED_WEIGHT = 0.1
 """Robust weight above which a correspondence counts as used."""
@@ -14,12 +17,13 @@ _SUPPORT = 1.0
 """Sum of the robust weights around a vertex from which on it counts as seen."""
 
 
-def support(fit: Fit, surface: int) -> NDArray[np.float64]:
+def support(optimum: Optimum, surface: int) -> NDArray[np.float64]:
     """Return the robust weight (V,) of the observations around every vertex of a surface."""
-    total = np.zeros(fit.problem.surfaces[surface].lattice.size)
-    for k, lin in enumerate(fit.optimum.evaluation.linearisations):
-        if fit.problem.plan.surface_of(k) == surface:
-            weight = np.repeat(fit.optimum.weights[k], 3)
+    problem = optimum.objective.problem
+    total = np.zeros(problem.surfaces[surface].lattice.size)
+    for k, lin in enumerate(optimum.evaluation.linearisations):
+        if problem.plan.surface_of(k) == surface:
+            weight = np.repeat(optimum.weights[k], 3)
             total += np.bincount(lin.triangles.ravel(), weight, len(total))
     return total
 
@@ -34,7 +38,7 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
         inflation: multiplies the formal standard deviation.
     """
     lattice, rho = fit.problem.surfaces[surface].lattice, fit.optimum.state.rho[surface]
-    seen = support(fit, surface) >= _SUPPORT
+    seen = support(fit.optimum, surface) >= _SUPPORT
     faces = lattice.faces[seen[lattice.faces].all(1)]
     kept, flat = np.unique(faces, return_inverse=True)
     std = inflation * fit.uncertainty.rho_std[surface] / rho**2
@@ -43,35 +47,42 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
     )
 
 
-def frame_maps(fit: Fit, camera: CameraModel) -> tuple[list[FrameMaps], list[NDArray[np.float64]]]:
-    """Render every frame at all pixels.
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """One frame rendered at every pixel of the camera."""
 
-    Returns:
-        The maps, and for each frame the range (H, W) along the unit camera rays in baselines,
-        NaN where the surface was not seen.
-    """
+    q: NDArray[np.float32]
+    """(H, W, 2) projector coordinates, pattern pixels, NaN where no seen surface is met."""
+    range: NDArray[np.float64]
+    """(H, W) range along the unit camera rays, working unit, NaN likewise."""
+    used: NDArray[np.bool_]
+    """(H, W) correspondences that the robust loss kept."""
+
+
+def render_frames(optimum: Optimum, camera: CameraModel) -> list[Rendering]:
+    """Render every frame of an optimum at all pixels."""
+    problem, state = optimum.objective.problem, optimum.state
+    problem.move_surfaces(state)
     rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
     finite = np.isfinite(rays).all(1)
     shape = (camera.height, camera.width)
-    fit.problem.move_surfaces(fit.optimum.state)
-    maps, ranges = [], []
-    for k, map_ in enumerate(fit.maps):
-        s = fit.problem.plan.surface_of(k)
-        old = fit.problem.renderers[k]
-        renderer = FrameRenderer(old.scene, rays[finite], fit.law, old.at_centre)
-        q, distance, triangles, hit = renderer.render(fit.optimum.state, k, s)
-        seen = hit & (support(fit, s)[triangles] >= _SUPPORT).all(1)
-        rendered = np.full((len(rays), 2), np.nan, np.float32)
-        rendered[finite] = np.where(seen, q, np.nan).T
+    out = []
+    for k, old in enumerate(problem.renderers):
+        s = problem.plan.surface_of(k)
+        renderer = FrameRenderer(old.scene, rays[finite], problem.law, old.at_centre)
+        coordinates, distance, triangles, hit = renderer.render(state, k, s)
+        seen = hit & (support(optimum, s)[triangles] >= _SUPPORT).all(1)
+        q = np.full((len(rays), 2), np.nan, np.float32)
+        q[finite] = np.where(seen, coordinates, np.nan).T
         range_ = np.full(len(rays), np.nan)
         range_[finite] = np.where(seen, distance, np.nan)
-        maps.append(FrameMaps(map_.name, map_.q, rendered.reshape(*shape, 2), _used(fit, k, shape)))
-        ranges.append(range_.reshape(shape))
-    return maps, ranges
+        used = np.zeros(shape, bool)
+        x, y = problem.frames[k].pixels.T
+        used[y, x] = optimum.weights[k] > USED_WEIGHT
+        out.append(Rendering(q.reshape(*shape, 2), range_.reshape(shape), used))
+    return out
 
 
-def _used(fit: Fit, frame: int, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    used = np.zeros(shape, bool)
-    x, y = fit.problem.frames[frame].pixels.T
-    used[y, x] = fit.optimum.weights[frame] > USED_WEIGHT
-    return used
+def frame_maps(fit: Fit, renderings: list[Rendering]) -> list[FrameMaps]:
+    """Put observed and rendered maps side by side."""
+    return [FrameMaps(m.name, m.q, r.q, r.used) for m, r in zip(fit.maps, renderings, strict=True)]

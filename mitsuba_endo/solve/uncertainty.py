@@ -141,7 +141,7 @@ def _block_contributions(
         J = (lin.J_local * root).transpose(0, 2, 1).reshape(2 * n, -1) @ chart
         effective = J - surface_rows(lin, root, len(X)) @ X
         weighted = (r * root).ravel()
-        block = _image_blocks(frame.pixels, frame.shape)
+        block = image_blocks(frame.pixels, frame.shape)
         for b in np.unique(block):
             rows = np.flatnonzero(block == b)
             if len(rows) < _SMALLEST_BLOCK:
@@ -154,7 +154,7 @@ def _block_contributions(
     return np.array(hessians), np.array(gradients), np.array(frames)
 
 
-def _image_blocks(pixels: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
+def image_blocks(pixels: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
     """Return the block index (N,) of pixels (x, y), in a grid over the part that they cover."""
     low = pixels.min(0)
     size = np.ptp(pixels, axis=0) + 1

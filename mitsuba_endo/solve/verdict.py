@@ -11,9 +11,13 @@ def verdict(solution: Solution) -> list[str]:
     unit = solution.units if solution.units == "mm" else "baselines"
     out = [_scale(solution)]
     out += _intrinsics(solution)
+    first = solution.frames[0].projector_from_camera
+    several = any(f.projector_from_camera != first for f in solution.frames)
     for frame in solution.frames:
         where = f" of {frame.name}" if len(solution.frames) > 1 else ""
-        out += _pose(f"Projector pose{where}", frame.projector_from_camera, unit)
+        if several or frame is solution.frames[0]:
+            named = f"Projector pose{where if several else ''}"
+            out += _pose(named, frame.projector_from_camera, unit)
         if frame.world_from_camera.status != "fixed":
             out += _pose(f"Camera pose{where}", frame.world_from_camera, unit)
     return out

@@ -23,6 +23,7 @@ def known_start(
     camera: CameraModel,
     projector: ProjectorModel,
     pose: RigidTransform,
+    usable: NDArray[np.bool_] | None = None,
 ) -> Start:
     """Triangulate one map under a given calibration.
 
@@ -31,13 +32,14 @@ def known_start(
         camera: the camera that saw the map.
         projector: with a focal length.
         pose: projector_from_camera, any unit of length.
+        usable: (H, W) correspondences that the cleaning kept, where it was done already.
 
     Raises:
         InputError: too few usable correspondences, or a map and camera of different size.
     """
     q = checked_map(q, camera)
     pose = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
-    data = gather(q, clean_map(q), camera)
+    data = gather(q, clean_map(q) if usable is None else usable, camera)
     state = evaluate(pose, projector, data)
     scale = robust_scale(state)
     at_camera, at_projector, _ = ranges(pose, state.seen, state.at)

@@ -1,0 +1,87 @@
+"""Exact correspondences of a mesh, for any poses, without a scene file."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.cameras import CameraModel
+from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
+from .moving_mesh import MovingMesh
+from .untyped import mi
+
+
+@dataclass(frozen=True, eq=False)
+class Correspondences:
+    """What an ideal decoder would find."""
+
+    q: NDArray[np.float64]
+    """(H, W, 2) pattern pixels, NaN where the camera or the projector does not see the surface."""
+    points: NDArray[np.float64]
+    """(H, W, 3) points seen, in the camera's frame; NaN where there is none."""
+
+
+class MeshScene:
+    """A mesh in the world, of which views give correspondences."""
+
+    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+        self._vertices, self._faces = vertices, faces
+        self._mesh = MovingMesh(vertices, faces)
+
+    def view(
+        self,
+        camera: CameraModel,
+        world_from_camera: RigidTransform,
+        projector: ProjectorModel,
+        projector_from_camera: RigidTransform,
+        size: tuple[int, int] | None = None,
+    ) -> Correspondences:
+        """Return the correspondences of one frame.
+
+        Args:
+            camera: which sees.
+            world_from_camera: its pose.
+            projector: which lights.
+            projector_from_camera: its pose relative to the camera.
+            size: pattern (width, height); coordinates outside are missing. None: no limit.
+        """
+        rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
+        points, hit = self._first_hit(world_from_camera.t, world_from_camera.rotate(rays))
+        camera_from_world = world_from_camera.inverse()
+        world_from_projector = world_from_camera @ projector_from_camera.inverse()
+        at = camera_from_world.apply(points)
+        q = projector.project(projector_from_camera.apply(at))
+        lit = hit & np.isfinite(q).all(1) & self._lit(world_from_projector.t, points)
+        if size is not None:
+            lit &= ((q >= -0.5) & (q <= np.array(size) - 0.5)).all(1)
+        shape = (camera.height, camera.width)
+        return Correspondences(
+            np.where(lit[:, None], q, np.nan).reshape(*shape, 2),
+            np.where(hit[:, None], at, np.nan).reshape(*shape, 3),
+        )
+
+    def _first_hit(
+        self, origin: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the points (N, 3), in double precision, where rays meet the mesh, and which do."""
+        triangle, hit = self._mesh.cast(_vector(np.broadcast_to(origin, directions.shape)),
+                                        _vector(directions))  # fmt: skip
+        a, b, c = (self._vertices[self._faces[triangle.numpy(), i]] for i in range(3))
+        normal = np.cross(b - a, c - a)
+        along = np.einsum("ni,ni->n", normal, directions)
+        distance = np.einsum("ni,ni->n", normal, a - origin) / np.where(along == 0, np.nan, along)
+        return origin + distance[:, None] * directions, hit.numpy() & np.isfinite(distance)
+
+    def _lit(self, origin: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points (N, 3) are seen from ``origin``."""
+        way = np.nan_to_num(points - origin, nan=1.0)
+        distance = np.linalg.norm(way, axis=1)
+        found, hit = self._first_hit(origin, way / distance[:, None])
+        reached = np.linalg.norm(np.nan_to_num(found) - origin, axis=1)
+        return ~hit | (reached > distance * (1 - 1e-3))
+
+
+def _vector(values: NDArray[np.float64]) -> Any:
+    return mi.Vector3d(*(np.ascontiguousarray(values[:, i]) for i in range(3)))

@@ -1,0 +1,165 @@
+"""The problem of several frames that share one surface."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..geometry.cameras import CameraModel
+from ..geometry.transforms import RigidTransform
+from ..start.registration import RangeImage, Registration
+from .initial import initial_rho
+from .lattice import Lattice, lattice_over
+from .optimum import Optimum
+from .options import Options
+from .plan import Plan
+from .problem import Observations, Problem, curvature_prior, make_problem
+from .state import INTRINSICS, State
+from .surface_result import render_frames
+
+MARGIN = 3
+"""Cells added around what the frames see: small steps of the cameras then stay on the surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameStart:
+    """One frame solved alone, in units of its own baseline."""
+
+    name: str
+    optimum: Optimum
+
+    @property
+    def observations(self) -> Observations:
+        return self.optimum.objective.problem.frames[0]
+
+    @property
+    def lattice(self) -> Lattice:
+        return self.optimum.objective.problem.surfaces[0].lattice
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(V, 3) vertices of its surface in its camera's frame."""
+        return self.lattice.vertices(self.optimum.state.rho[0])
+
+    def range_image(self, camera: CameraModel) -> RangeImage:
+        """Return what the registration of frames works on."""
+        rendering = render_frames(self.optimum, camera)[0]
+        return RangeImage(camera.rays(camera.pixel_grid()), rendering.range, camera)
+
+
+def joint_problem(
+    starts: list[FrameStart],
+    placed: list[Registration],
+    plan: Plan,
+    law: str,
+    options: Options,
+) -> tuple[Problem, State]:
+    """Build the joint problem of frames that were registered; the first one is the world.
+
+    Args:
+        starts: the frames solved alone.
+        placed: where each is, in units of the first one's baseline.
+        plan: sharing of the unknowns.
+        law: projector law.
+        options: of the surface.
+    """
+    points = np.concatenate(
+        [p.world_from_camera.apply(p.scale * s.points) for s, p in zip(starts, placed, strict=True)]
+    )
+    ranges = np.linalg.norm(points, axis=1)
+    directions = points / ranges[:, None]
+    lattice = lattice_over(directions, starts[0].lattice.cell, MARGIN)
+    state = State(
+        [initial_rho(lattice, directions, ranges)],
+        [p.world_from_camera for p in placed],
+        _projector_poses(starts, placed, plan),
+        _intrinsics(starts, plan),
+    )
+    return _problem(starts, lattice, state, plan, law, options), state
+
+
+def extended(
+    starts: list[FrameStart], optimum: Optimum, options: Options
+) -> tuple[Problem, State] | None:
+    """Return the problem with a surface grown to where cameras have moved, or None if it fits.
+
+    Rays that miss the surface are taken to end at their frame's median range.
+    """
+    old, state = optimum.objective.problem, optimum.state
+    missing = [_missed_points(old, optimum, k) for k in range(old.plan.frames)]
+    if sum(len(m) for m in missing) < MISSED_SHARE * old.observations:
+        return None
+    lattice = old.surfaces[0].lattice
+    points = np.concatenate([lattice.vertices(state.rho[0]), *missing])
+    directions = points / np.linalg.norm(points, axis=1, keepdims=True)
+    grown = lattice_over(directions, lattice.cell, 1)
+    at = grown.nearest(lattice.directions)
+    rho, seen = np.zeros(grown.size), np.zeros(grown.size, bool)
+    rho[at], seen[at] = state.rho[0], True
+    state = state.with_(rho=[grown.fill(seen, rho)])
+    return _problem(starts, grown, state, old.plan, old.law, options), state
+
+
+MISSED_SHARE = 0.01
+"""Share of rays that miss the surface from which on it is grown."""
+
+
+def _missed_points(problem: Problem, optimum: Optimum, frame: int) -> NDArray[np.float64]:
+    hit = optimum.evaluation.linearisations[frame].hit
+    if hit.all():
+        return np.zeros((0, 3))
+    state = optimum.state
+    _, distance, _, _ = problem.renderers[frame].render(state, frame, 0)
+    median = float(np.median(distance[hit])) if hit.any() else 1 / float(np.median(state.rho[0]))
+    return state.world_from_camera[frame].apply(median * problem.frames[frame].rays[~hit])
+
+
+def _problem(
+    starts: list[FrameStart],
+    lattice: Lattice,
+    state: State,
+    plan: Plan,
+    law: str,
+    options: Options,
+) -> Problem:
+    density = float(np.median([len(s.observations.rays) / s.lattice.size for s in starts]))
+    focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
+    disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
+    prior = curvature_prior(lattice, density, disparity, options.smoothness)
+    return make_problem([s.observations for s in starts], [lattice], [prior], plan, law)
+
+
+def _projector_poses(
+    starts: list[FrameStart], placed: list[Registration], plan: Plan
+) -> list[RigidTransform]:
+    own = [s.optimum.state.projector_from_camera[0] for s in starts]
+    poses = [RigidTransform(pose.R, pose.t * p.scale) for pose, p in zip(own, placed, strict=True)]
+    if plan.blocks["projector_pose"] == "per_frame":
+        return poses
+    mean = np.mean([pose.t / np.linalg.norm(pose.t) for pose in own], axis=0)
+    R = Rotation.from_matrix([pose.R for pose in own]).mean().as_matrix()
+    return [RigidTransform(R, mean / np.linalg.norm(mean))] * len(poses)
+
+
+def _intrinsics(starts: list[FrameStart], plan: Plan) -> list[NDArray[np.float64]]:
+    own = np.array([s.optimum.state.intrinsics[0] for s in starts])
+    for name, place in INTRINSICS.items():
+        if plan.blocks[name] != "per_frame":
+            own[:, place] = np.median(own[:, place], axis=0)
+    return list(own)
+
+
+def at_identity(frames: int) -> list[Registration]:
+    """Return the placement of all cameras at the same place."""
+    here = RigidTransform.identity()
+    return [Registration(here, 1.0, 0.0, 1.0, True, "") for _ in range(frames)]
+
+
+def single_plan(plan: Plan) -> Plan:
+    """Return the plan of one frame solved alone."""
+    blocks = {
+        name: "fixed" if name == "camera_pose" or mode == "fixed" else "shared"
+        for name, mode in plan.blocks.items()
+    }
+    return replace(plan, frames=1, surface="shared", blocks=blocks, _slots={})

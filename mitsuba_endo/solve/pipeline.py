@@ -1,0 +1,153 @@
+"""The stages from maps to a fit, for one frame, frames with their own surfaces, or a shared one."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from ..geometry.cameras import CameraModel
+from ..records.calibration import TraceRow
+from ..records.correspondence import CorrespondenceMap
+from ..records.rig import Rig
+from ..records.solution import LeftOut
+from ..start.registration import Registration, register_frames
+from .drift import drift_prior
+from .fit import Fit
+from .frames import common_start, solve_alone, usable_starts
+from .joint import FrameStart, at_identity, extended, joint_problem
+from .optimum import Optimum
+from .options import Options
+from .plan import make_plan
+from .run import OnIteration, Progress, optimise
+from .single import separate_surfaces
+from .state import State
+from .uncertainty import uncertainty
+
+_MAX_EXTENSIONS = 10
+"""Times that the surface may grow while cameras that started at one place spread."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What is to be solved, under one projector law."""
+
+    maps: list[CorrespondenceMap]
+    camera: CameraModel
+    rig: Rig
+    law: str
+    options: Options
+    timings: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time of a block to a stage's."""
+        began = time.perf_counter()
+        yield
+        self.timings[stage] = self.timings.get(stage, 0.0) + time.perf_counter() - began
+
+
+def solve(job: Job, say: Progress) -> Fit:
+    """Solve a job.
+
+    Raises:
+        InputError: no frame can be used, or the plan contradicts itself.
+    """
+    make_plan(job.rig, len(job.maps))  # a contradiction is told before any work
+    if len(job.maps) > 1 and job.rig.share.surface == "shared":
+        return _shared_surface(job, say)
+    return _own_surfaces(job, say)
+
+
+def _own_surfaces(job: Job, say: Progress) -> Fit:
+    say(0.05, "Searching for a start")
+    with job.timed("start"):
+        maps, starts, left_out = usable_starts(job.maps, job.camera, job.rig, job.law, job.options)
+        plan = make_plan(job.rig, len(maps))
+        if len(maps) > 1 and plan.blocks["projector_pose"] != "per_frame":
+            starts = common_start(maps, starts, job.camera)
+    say(0.4, "Optimising")
+    notes = list(dict.fromkeys(note for s in starts for note in s.notes))
+    with job.timed("optimise"):
+        problem, state = separate_surfaces(maps, starts, job.camera, plan, job.law, job.options)
+        optimum = optimise(problem, state, job.options, on_iteration=_reporter(job, say, 0.4))
+    return _finish(job, maps, left_out, notes, optimum, say)
+
+
+def _shared_surface(job: Job, say: Progress) -> Fit:
+    say(0.05, "Searching for a start")
+    with job.timed("start"):
+        maps, starts, left_out = usable_starts(job.maps, job.camera, job.rig, job.law, job.options)
+    say(0.3, "Solving every frame alone")
+    with job.timed("frames"):
+        plan = make_plan(job.rig, len(maps))
+        alone = solve_alone(maps, starts, job.camera, plan, job.law, job.options)
+    say(0.5, "Registering the frames")
+    with job.timed("registration"):
+        placed = _place(job, alone)
+    kept = [k for k, p in enumerate(placed) if p.reliable]
+    left_out += [
+        LeftOut(name=alone[k].name, reason=_named(p.reason, alone))
+        for k, p in enumerate(placed)
+        if not p.reliable
+    ]
+    notes = list(dict.fromkeys(note for k in kept for note in starts[k].notes))
+    say(0.6, "Optimising all frames")
+    with job.timed("optimise"):
+        optimum = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
+    return _finish(job, [maps[k] for k in kept], left_out, notes, optimum, say)
+
+
+def _place(job: Job, alone: list[FrameStart]) -> list[Registration]:
+    if job.options.cameras == "identity":
+        return at_identity(len(alone))
+    return register_frames([a.range_image(job.camera) for a in alone], seed=job.options.seed)
+
+
+def _named(reason: str, alone: list[FrameStart]) -> str:
+    """Replace frame numbers of a registration's reason by names."""
+    for k, frame in reversed(list(enumerate(alone))):
+        reason = reason.replace(f"against frame {k}:", f"against {frame.name}:")
+    return reason
+
+
+def _optimise_joint(
+    job: Job, alone: list[FrameStart], placed: list[Registration], say: Progress
+) -> Optimum:
+    plan = make_plan(job.rig, len(alone))
+    problem, state = joint_problem(alone, placed, plan, job.law, job.options)
+    extra = drift_prior(job.rig, plan)
+    report = _reporter(job, say, 0.6)
+    optimum = optimise(problem, state, job.options, extra, report)
+    for _ in range(_MAX_EXTENSIONS):
+        grown = extended(alone, optimum, job.options)
+        if grown is None:
+            break
+        optimum = optimise(*grown, job.options, extra, report)
+    return optimum
+
+
+def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
+    """Return a callback that shows the iterations in the rest of the progress bar."""
+
+    def report(row: TraceRow, _state: State) -> None:
+        share = min(row.iteration / job.options.max_iterations, 1.0)
+        focal = f", f = {row.focal:.2f} px" if row.focal is not None else ""
+        say(begin + (1 - begin) * share, f"Optimising (iteration {row.iteration}{focal})")
+
+    return report
+
+
+def _finish(
+    job: Job,
+    maps: list[CorrespondenceMap],
+    left_out: list[LeftOut],
+    notes: list[str],
+    optimum: Optimum,
+    say: Progress,
+) -> Fit:
+    say(0.95, "Computing standard deviations")
+    with job.timed("uncertainty"):
+        known = uncertainty(optimum, job.options.jackknife)
+    return Fit(
+        job.law, maps, left_out, optimum.objective.problem, optimum, known, notes, job.timings
+    )
