@@ -2,7 +2,7 @@
 
 Partners are found by projection: a moved source point is compared with the target point seen in
 its direction (Blais and Levine 1995; point-to-plane after Chen and Medioni 1992). All lengths are
-relative to the mean range of each frame, residuals to the target's.
+in the common unit of the frames, their typical range.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,8 @@ SCALE_SPREAD = 0.15
 """Standard deviation of the prior on the log of the frames' relative scale."""
 MIN_NORMAL_COSINE = 0.5
 """Partners' normals differ by less than 60 degrees."""
+MAX_STEP = 0.3
+"""Bound on a step's components (radians, common unit, log): few partners can ask for anything."""
 NEAR = 3.0
 """A partner is at most this many scales of the robust loss off the tangent plane."""
 
@@ -28,7 +30,7 @@ class Source:
     """Points to be moved, a sample of a level."""
 
     points: Floats
-    """(N, 3) in the source camera's frame, relative to its mean range."""
+    """(N, 3) in the source camera's frame."""
     normals: Floats
     """(N, 3)"""
     weights: Floats
@@ -108,7 +110,8 @@ def align(
     for _ in range(steps):
         found = match(pose, source, target, scale)
         A, b, about = normal_equations(pose, found, scale)
-        pose = pose.moved(np.linalg.solve(A, -b[..., None])[..., 0], about)
+        step = np.linalg.solve(A, -b[..., None])[..., 0].astype(np.float64)
+        pose = pose.moved(np.clip(step, -MAX_STEP, MAX_STEP), about)
     return pose
 
 

@@ -1,6 +1,7 @@
 """Range images and the coarser point-and-normal images that registration works on."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -14,6 +15,10 @@ MIN_COSINE = 0.12
 """Surface seen more obliquely than this (83 degrees) is taken for a depth edge."""
 MAX_SPREAD = 0.08
 """Ranges in one block that spread more than this about their mean lie across a depth edge."""
+COARSE_COLUMNS, FINE_COLUMNS = 54, 110
+"""Columns to which images are averaged."""
+MIN_POINTS = 50
+"""An image with fewer usable points is not worth trying."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +46,11 @@ class Level:
     """(rows * columns + 1,) index into ``points`` of a block, ``len(points)`` if not usable; the
     last entry stands for everything outside the image."""
     points: Floats
-    """(N + 1, 3) in the camera frame, relative to the mean range; the last one is a placeholder."""
+    """(N + 1, 3) in the camera frame, in the unit asked for; the last one is a placeholder."""
     normals: Floats
     """(N + 1, 3) unit, towards the camera; zero for the placeholder."""
     weights: Floats
-    """(N + 1,) 1 / noise relative to a point at the mean range; zero for the placeholder."""
+    """(N + 1,) 1 / noise relative to a point at unit range; zero for the placeholder."""
 
     @property
     def size(self) -> int:
@@ -64,19 +69,42 @@ class Level:
         return self.slot[block.astype(np.int32)]
 
 
-def mean_range(image: RangeImage) -> float:
-    """Return the median range, the unit of a frame's levels; NaN for an empty image."""
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A range image in the common unit of all frames, and its levels, made when asked for."""
+
+    image: RangeImage
+    unit: float
+    """Length that counts as 1, in the image's own unit."""
+
+    @cached_property
+    def coarse(self) -> Level:
+        return self._level(COARSE_COLUMNS)
+
+    @cached_property
+    def fine(self) -> Level:
+        return self._level(FINE_COLUMNS)
+
+    def _level(self, columns: int) -> Level:
+        return make_level(self.image, max(1, round(self.image.range.shape[1] / columns)), self.unit)
+
+    @property
+    def usable(self) -> bool:
+        return min(self.coarse.size, self.fine.size) >= MIN_POINTS
+
+
+def typical_range(image: RangeImage) -> float:
+    """Return the median range; NaN for an empty image."""
     seen = image.range[np.isfinite(image.range)]
     return float(np.median(seen)) if seen.size else float("nan")
 
 
-def make_level(image: RangeImage, block: int) -> Level:
-    """Average ``image`` over blocks of ``block`` x ``block`` pixels and find normals.
+def make_level(image: RangeImage, block: int, unit: float) -> Level:
+    """Average ``image`` over blocks of ``block`` x ``block`` pixels, in ``unit``, with normals.
 
     Noise of a triangulated range grows with its square, and that of a point's distance from a plane
     also with the cosine between ray and normal, which the weights undo.
     """
-    unit = mean_range(image)
     mean = _block_means(image, unit, block)
     normal = _normals(mean)
     distance = np.linalg.norm(mean, axis=-1)
@@ -95,7 +123,7 @@ def make_level(image: RangeImage, block: int) -> Level:
 
 
 def _block_means(image: RangeImage, unit: float, block: int) -> Floats:
-    """Return the mean point (rows, columns, 3) of each block in ``unit``; NaN if half is missing."""
+    """Return the mean points (rows, columns, 3) of blocks in ``unit``; NaN if half is missing."""
     rows, columns = image.range.shape[0] // block, image.range.shape[1] // block
     crop = (slice(rows * block), slice(columns * block))
     ranges = image.range[crop] / unit
@@ -112,9 +140,8 @@ def _block_means(image: RangeImage, unit: float, block: int) -> Floats:
     mean = cv2.resize(stacked, (columns, rows), interpolation=cv2.INTER_AREA)
     share = mean[..., 3]
     with np.errstate(invalid="ignore", divide="ignore"):
-        points, first, second = (
-            mean[..., :3] / share[..., None], mean[..., 4] / share, mean[..., 5] / share
-        )  # fmt: skip
+        points = np.asarray(mean[..., :3] / share[..., None], np.float64)
+        first, second = mean[..., 4] / share, mean[..., 5] / share
         spread = np.sqrt(np.maximum(second - first * first, 0)) / first
         points[~((share >= 0.5) & (spread < MAX_SPREAD))] = np.nan
     return points
@@ -124,7 +151,7 @@ def _normals(points: Floats) -> Floats:
     """Return unit normals (H, W, 3) towards the camera; NaN where a 3x3 neighbour is missing."""
     across = cv2.Sobel(points, cv2.CV_64F, 1, 0, ksize=3, borderType=cv2.BORDER_REPLICATE)
     down = cv2.Sobel(points, cv2.CV_64F, 0, 1, ksize=3, borderType=cv2.BORDER_REPLICATE)
-    n = np.cross(down, across)
+    n = np.cross(down, across).astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 

@@ -47,15 +47,6 @@ class Similarities:
         R, s = np.swapaxes(self.R, 1, 2), 1 / self.s
         return Similarities(R, -s[:, None] * (R @ self.t[..., None])[..., 0], s)
 
-    def rescaled(self, unit_in: float, unit_out: float) -> "Similarities":
-        """Return the same transforms for lengths in other units.
-
-        Args:
-            unit_in: the old unit of x_in, in the new one.
-            unit_out: the old unit of x_out, in the new one.
-        """
-        return Similarities(self.R, self.t * unit_out, self.s * unit_out / unit_in)
-
     def apply(self, points: Floats) -> Floats:
         """Transform points (N, 3), or (B, N, 3), to (B, N, 3)."""
         turned = points @ np.swapaxes(self.s[:, None, None] * self.R, 1, 2)
@@ -75,5 +66,5 @@ class Similarities:
         )
 
     def angle_to(self, other: "Similarities") -> Floats:
-        """Return the rotation angles (B,) between these and ``other``, radians."""
+        """Return the rotation angles (B,) between these and ``other`` (B or 1), radians."""
         return Rotation.from_matrix(np.swapaxes(self.R, 1, 2) @ other.R).magnitude()
