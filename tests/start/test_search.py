@@ -84,10 +84,10 @@ def test_finds_random_rigs_of_wide_cameras_and_projectors():
 
 
 @pytest.mark.slow
-def test_finds_99_of_100_fisheye_rigs():
+def test_finds_50_fisheye_rigs():
     """Oracle: the rigs' truth (see ``_succeeds``)."""
     camera = lopsided_fisheye()
-    assert sum(_succeeds(seed, camera) for seed in range(3000, 3100)) >= 99
+    assert [seed for seed in range(3000, 3050) if not _succeeds(seed, camera)] == []
 
 
 @pytest.mark.slow
