@@ -8,6 +8,7 @@ import typer
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 
 if TYPE_CHECKING:
+    from ..records.checkpoint import Checkpoint
     from ..records.correspondence import CorrespondenceMap
     from ..records.rig import Rig
     from ..records.solution import Solution
@@ -35,6 +36,10 @@ Share = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of the random samples in the search.")]
+Resume = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Go on from an earlier or interrupted calibration."),
+]
 
 
 def calibrate(
@@ -45,6 +50,7 @@ def calibrate(
     start: Start = "search",
     share: Share = None,
     seed: Seed = 0,
+    resume: Resume = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -52,12 +58,14 @@ def calibrate(
     """Find projector pose, focal length and surface from correspondence maps."""
     with session(quiet, as_json, debug) as output:
         from ..files import check_output_folder
+        from ..records.checkpoint import load_checkpoint
         from ..solve.options import Options
 
         check_output_folder(out)
+        checkpoint = None if resume is None else load_checkpoint(resume)
         frames, rig_record = load_input(maps, rig, share)
         options = Options(solver=solver, start=start, seed=seed)
-        solution = solve_and_write(frames, rig_record, options, out, output)
+        solution = solve_and_write(frames, rig_record, options, out, output, checkpoint)
         report(solution, out, output)
         raise typer.Exit(exit_code(solution))
 
@@ -116,7 +124,12 @@ def with_sharing(rig: "Rig", text: str) -> "Rig":
 
 
 def solve_and_write(
-    maps: list["CorrespondenceMap"], rig: "Rig", options: "Options", out: Path, output: Session
+    maps: list["CorrespondenceMap"],
+    rig: "Rig",
+    options: "Options",
+    out: Path,
+    output: Session,
+    resume: "Checkpoint | None" = None,
 ) -> "Solution":
     """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
@@ -126,7 +139,7 @@ def solve_and_write(
         from ..show.solution_folder import write_solution_folder
         from ..solve.calibrate import calibrate as solve
 
-        result = solve(maps, rig, options, advance)
+        result = solve(maps, rig, options, advance, resume)
         advance(0.95, "Drawing pictures")
         return write_solution_folder(out, result, rig)
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
+from .checkpoint import Checkpoint
 from .solution import Solution
 
 
@@ -66,3 +67,8 @@ class Calibration:
     surface: SurfaceEstimate
     frames: list[FrameMaps]
     trace: list[TraceRow] = field(default_factory=list)
+    checkpoint: Checkpoint | None = None
+    """From which the optimisation can go on."""
+    own_surfaces: dict[int, SurfaceEstimate] = field(default_factory=dict)
+    """Where frames do not share a surface: those of the frames after the first, by index, each in
+    its camera's frame."""

@@ -10,6 +10,8 @@ import yaml
 
 from ..files import atomic_folder, atomic_path
 from ..records.calibration import Calibration, TraceRow
+from ..records.checkpoint import FILE as CHECKPOINT
+from ..records.checkpoint import save_checkpoint
 from ..records.correspondence import save_map
 from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
@@ -30,10 +32,13 @@ def write_solution_folder(
     ====================  =========================================================================
     solution.json         values, uncertainty, verdict
     surface.ply           the surface in the first camera's frame, ``std_0`` per vertex
+    surface_01.ply ...    those of the other frames, in their cameras' frames, where frames do not
+                          share one
     scene.xml             the calibrated scene; left out, with a warning in solution.json, where a
                           value it needs could not be determined
     rendered*.exr         projector coordinates rendered from the solution, one file a frame
     trace.csv             the iterations
+    state.npz             from which ``calibrate --resume`` goes on
     rig.yaml              the rig with all defaults filled in, if given
     overview.png          look at this first; the other pictures show the same at full size:
                           observed, rendered, residual, histogram, surface, convergence
@@ -49,7 +54,11 @@ def write_solution_folder(
         solution = _write_scene(folder, calibration, rig)
         save_solution(folder / "solution.json", solution)
         save_surface(folder / SURFACE, calibration.surface)
+        for k, surface in calibration.own_surfaces.items():
+            save_surface(folder / own_surface_name(k), surface)
         save_trace(folder / "trace.csv", calibration.trace)
+        if calibration.checkpoint is not None:
+            save_checkpoint(folder / CHECKPOINT, calibration.checkpoint)
         for name, frame in zip(map_names(calibration), calibration.frames, strict=True):
             save_map(folder / name, frame.rendered)
         if rig is not None:
@@ -64,6 +73,11 @@ def map_names(calibration: Calibration) -> list[str]:
         return ["rendered.exr"]
     plain = [re.sub(r"[^\w.-]+", "_", frame.name) for frame in calibration.frames]
     return [f"rendered_{i:02d}_{Path(name).stem}.exr" for i, name in enumerate(plain)]
+
+
+def own_surface_name(frame: int) -> str:
+    """Return the file name of the surface of one frame, where frames do not share one."""
+    return f"surface_{frame:02d}.ply" if frame else SURFACE
 
 
 def save_trace(path: str | Path, trace: list[TraceRow]) -> None:

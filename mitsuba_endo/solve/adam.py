@@ -1,7 +1,9 @@
 """The published first-order solver: Adam on the same objective and the same unknowns.
 
 The gradient of the rendered coordinates' robust cost comes from one backward pass of Dr.Jit; the
-unknowns step in the charts that Gauss-Newton uses.
+unknowns step in the charts that Gauss-Newton uses. Focal length, translation along the axis,
+rotation and the depth of the whole surface form a narrow valley, along which thousands of small
+steps are needed.
 """
 
 import time
@@ -9,34 +11,64 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import drjit
 import numpy as np
 from numpy.typing import NDArray
 
 from ..records.calibration import TraceRow
 from ..records.solution import Outcome
-from ..rendering.untyped import dr, mi
 from .gauss_newton import trace_row
 from .objective import Objective, estimate_noise, evaluate
 from .optimum import Optimum, make_optimum
+from .plan import Plan
 from .state import State
 from .stepping import apply_step
 
-RATES = {"camera_pose": 1e-3, "projector_pose": 1e-3, "focal": 1e-3, "centre": 0.3,
-         "aspect": 1e-3, "distortion": 1e-3}  # fmt: skip
-"""First learning rates: radians and baselines for poses, relative for focal length and aspect."""
+# Its members depend on the active variant, so it has no static types.
+dr: Any = drjit
+ROTATION_RATE = 1e-3
+"""First learning rate of rotations, radians."""
+TRANSLATION_RATE = 1e-2
+"""First learning rate of translations, baselines: as many pixels as a rotation moves."""
+RATES = {"focal": 1e-3, "centre": 0.3, "aspect": 1e-3, "distortion": 1e-3}
+"""First learning rates of the intrinsics: relative, pattern pixels, relative, plain."""
 SURFACE_RATE = 3e-3
 """First learning rate of the inverse ranges, relative to their median."""
-_LAST_RATE = 0.01
-"""Factor that the learning rates have fallen by at the last iteration (cosine schedule)."""
+MEAN_DECAY = 0.95
+SQUARE_DECAY = 0.99
+"""Gradients fall by orders of magnitude on the way down; Adam's usual 0.999 would remember the
+first ones for thousands of iterations and all but stop."""
 _WINDOW = 100
 """Iterations between looks at the cost."""
-_STILL = 1e-6
-"""Relative change of the cost over a window that counts as none."""
+_GAIN = 2e-3
+"""Relative fall of the cost over a window below which the steps are too long: rates are halved."""
+_LAST_RATE = 2**-8
+"""Factor of the learning rates at which a cost that stands still ends a stage."""
+
+
+@dataclass(eq=False)
+class Moments:
+    """Adam's running means of a gradient and of its square (Kingma and Ba 2015, algorithm 1)."""
+
+    size: int
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        self._mean, self._square = np.zeros(self.size), np.zeros(self.size)
+
+    def step(self, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the step (N,) in units of the learning rates."""
+        self.count += 1
+        self._mean += (1 - MEAN_DECAY) * (gradient - self._mean)
+        self._square += (1 - SQUARE_DECAY) * (gradient * gradient - self._square)
+        mean = self._mean / (1 - MEAN_DECAY**self.count)
+        square = self._square / (1 - SQUARE_DECAY**self.count)
+        return -mean / (np.sqrt(square) + 1e-300)
 
 
 @dataclass(eq=False)
 class Adam:
-    """The optimiser: both stages of the objective, half of the iterations each."""
+    """The optimiser: stages of the objective, each until the cost stands still."""
 
     objective: Objective
     max_iterations: int
@@ -50,71 +82,74 @@ class Adam:
         self.objective.sigma = estimate_noise(self._now)
         outcome = Outcome.MAX_ITERATIONS
         try:
-            outcome = self._stage(self.max_iterations // 2)
-            self.objective.next_stage(self._now)
-            outcome = self._stage(self.max_iterations - len(self.trace) * _WINDOW)
+            outcome = self._stage()
+            while outcome == Outcome.CONVERGED and self.objective.next_stage(self._now):
+                outcome = self._stage()
         except KeyboardInterrupt:
             if not self.trace:
                 raise
             outcome = Outcome.INTERRUPTED
         return make_optimum(outcome, self.objective, self._now, self.trace)
 
-    def _stage(self, iterations: int) -> Outcome:
-        """Descend in windows until the cost stands still."""
-        optimiser = self._optimiser(self._now.state)
-        windows = max(iterations // _WINDOW, 1)
-        before = np.inf
-        for window in range(windows):
-            rate = _LAST_RATE + (1 - _LAST_RATE) * (1 + np.cos(np.pi * window / windows)) / 2
-            optimiser.set_learning_rate(rate)
-            state, size = self._descend(optimiser, self._now.state)
-            self._look(state, size)
+    def _stage(self) -> Outcome:
+        """Descend in windows, with shorter steps whenever the cost stands still."""
+        state = self._now.state
+        rates = surface_rates(state), global_rates(self.objective.problem.plan)
+        moments = Moments(sum(map(len, state.rho)) + len(rates[1]))
+        rate = 1.0
+        while len(self.trace) * _WINDOW < self.max_iterations:
+            before = self._now
+            state, size = self._descend(moments, before.state, rate * np.concatenate(rates))
+            self._now = evaluate(self.objective.problem, state)
             steady = self.objective.follow(self._now)
-            cost = self.objective.cost(self._now)
-            if steady and abs(before - cost) < _STILL * cost:
-                return Outcome.CONVERGED
-            before = cost if steady else np.inf
+            self._record(rate * size)
+            # Both under the scale of now, or its fall would pass for progress.
+            gain = 1 - self.objective.cost(self._now) / self.objective.cost(before)
+            if steady and gain < _GAIN:
+                if rate <= _LAST_RATE:
+                    return Outcome.CONVERGED
+                rate /= 2
         return Outcome.MAX_ITERATIONS
 
-    def _descend(self, optimiser: Any, state: State) -> tuple[State, float]:
-        """Make the iterations of one window."""
-        size = 0.0
+    def _descend(
+        self, moments: Moments, state: State, rates: NDArray[np.float64]
+    ) -> tuple[State, float]:
+        """Make the iterations of one window; return the last step's size in rates too."""
+        plan = self.objective.problem.plan
+        ends = np.cumsum([len(rho) for rho in state.rho])
+        relative = np.zeros(len(rates))
         for _ in range(_WINDOW):
             surfaces, globals_ = gradient(self.objective, state)
-            moves = []
-            for name, g in [*((f"surface{i}", g) for i, g in enumerate(surfaces)),
-                            ("globals", globals_)]:  # fmt: skip
-                before = optimiser[name].numpy()
-                # Rates per unknown: the optimiser steps in units of them.
-                dr.set_grad(optimiser[name], mi.Float64(g * self._rates[name]))
-                moves.append((name, before))
-            optimiser.step()
-            steps = [(optimiser[n].numpy() - before) * self._rates[n] for n, before in moves]
-            size = max(float(np.abs(s).max(initial=0.0)) for s in steps)
-            plan = self.objective.problem.plan
-            state = apply_step(plan, state, steps[:-1], steps[-1][: plan.columns])
-        return state, size
+            relative = moments.step(np.concatenate([*surfaces, globals_]))
+            *steps, step = np.split(rates * relative, ends)
+            state = apply_step(plan, state, steps, step)
+        return state, float(np.abs(relative).max(initial=0.0))
 
-    def _look(self, state: State, size: float) -> None:
-        self._now = evaluate(self.objective.problem, state)
+    def _record(self, size: float) -> None:
         iteration = (len(self.trace) + 1) * _WINDOW
         row = trace_row(self.objective, self._now, iteration, self._began, size, 0.0)
         self.trace.append(row)
         if self.on_iteration is not None:
-            self.on_iteration(row, state)
+            self.on_iteration(row, self._now.state)
 
-    def _optimiser(self, state: State) -> Any:
-        plan = self.objective.problem.plan
-        rates = np.zeros(max(plan.columns, 1))
-        for (name, _), slot in plan.slots.items():
+
+def surface_rates(state: State) -> NDArray[np.float64]:
+    """Return the first learning rates of all surfaces, one after the other."""
+    return np.concatenate(
+        [np.full(len(rho), SURFACE_RATE * float(np.median(rho))) for rho in state.rho]
+    )
+
+
+def global_rates(plan: Plan) -> NDArray[np.float64]:
+    """Return the first learning rates (G,) of the global unknowns."""
+    rates = np.zeros(plan.columns)
+    for (name, _), slot in plan.slots.items():
+        if name in RATES:
             rates[slot] = RATES[name]
-        self._rates: dict[str, Any] = {"globals": rates}
-        optimiser = dr.opt.Adam(lr=1.0)
-        optimiser["globals"] = mi.Float64(np.zeros_like(rates))
-        for i, rho in enumerate(state.rho):
-            self._rates[f"surface{i}"] = SURFACE_RATE * float(np.median(rho))
-            optimiser[f"surface{i}"] = mi.Float64(np.zeros_like(rho))
-        return optimiser
+        else:
+            rates[slot] = TRANSLATION_RATE
+            rates[slot.start : slot.start + 3] = ROTATION_RATE
+    return rates
 
 
 def gradient(
@@ -126,7 +161,10 @@ def gradient(
     """
     problem, plan = objective.problem, objective.problem.plan
     problem.move_surfaces(state)
-    surfaces = [np.zeros_like(rho) for rho in state.rho]
+    surfaces = [
+        surface.prior.gradient(rho, objective.sigma)
+        for surface, rho in zip(problem.surfaces, state.rho, strict=True)
+    ]
     globals_ = np.zeros(plan.columns)
     for k, (frame, renderer) in enumerate(zip(problem.frames, problem.renderers, strict=True)):
         s = plan.surface_of(k)
@@ -136,10 +174,6 @@ def gradient(
         )  # fmt: skip
         surfaces[s] += d_rho
         globals_ += d_local @ plan.local_to_global(state, k)
-    for i, (surface, rho) in enumerate(zip(problem.surfaces, state.rho, strict=True)):
-        surfaces[i] += surface.prior.normal(rho, objective.sigma)[1]
     if objective.extra is not None:
         globals_ += objective.sigma**2 * objective.extra(state)[1]
-    padded = np.zeros(max(plan.columns, 1))
-    padded[: plan.columns] = globals_
-    return surfaces, padded
+    return surfaces, globals_

@@ -34,6 +34,7 @@ from .observability import (
 )
 from .options import Options
 from .plan import Plan
+from .resume import checkpoint_of
 from .scale import Unit, resolve_unit
 from .state import INTRINSICS
 from .surface_result import USED_WEIGHT, frame_maps, render_frames, surface_estimate
@@ -84,10 +85,13 @@ def assemble(
     Raises:
         InputError: the scale cannot be resolved.
     """
-    renderings = render_frames(fit.optimum, camera)
+    renderings = render_frames(fit.reported, camera)
     unit = resolve_unit(rig, camera, [r.range for r in renderings])
     report = _report(fit, unit)
-    surface = surface_estimate(fit, 0, unit.factor, _inflation(fit))
+    surfaces = [
+        surface_estimate(fit, i, unit.factor, _inflation(fit))
+        for i in range(fit.problem.plan.surfaces)
+    ]
     solution = Solution(
         outcome=fit.optimum.outcome,
         units=unit.name,
@@ -107,13 +111,16 @@ def assemble(
         warnings=[*fit.notes, *(warnings or []), *_warnings(fit)],
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
-    return Calibration(solution, camera, surface, frame_maps(fit, renderings), fit.optimum.trace)
+    return Calibration(
+        solution, camera, surfaces[0], frame_maps(fit, renderings), fit.optimum.trace,
+        checkpoint_of(fit.optimum), dict(enumerate(surfaces[1:], 1)),
+    )  # fmt: skip
 
 
 def _report(fit: Fit, unit: Unit) -> Report:
-    names = unknowns(fit.problem.plan, fit.optimum.state)
+    names = unknowns(fit.problem.plan, fit.state)
     covariance = _larger(fit)
-    rho = fit.optimum.state.rho[0]
+    rho = fit.state.rho[0]
     points = fit.problem.surfaces[0].lattice.vertices(rho)
     return Report(
         fit, unit, covariance, names,
@@ -180,7 +187,7 @@ def _intrinsic(report: Report, block: str, frame: int) -> Estimate:
 
 
 def _values(report: Report, block: str, frame: int) -> NDArray[np.float64]:
-    vector = report.fit.optimum.state.intrinsics[frame][INTRINSICS[block]]
+    vector = report.fit.state.intrinsics[frame][INTRINSICS[block]]
     if block in ("focal", "aspect"):
         return np.exp(vector)
     if block == "distortion":
@@ -210,9 +217,9 @@ def _worst(report: Report, columns: range) -> Status:
 
 def _frame(report: Report, k: int) -> Frame:
     fit = report.fit
-    state = fit.optimum.state
-    weight = fit.optimum.weights[k]
-    r2 = fit.optimum.evaluation.squared(k)
+    state = fit.state
+    weight = fit.reported.weights[k]
+    r2 = fit.reported.evaluation.squared(k)
     used = weight > USED_WEIGHT
     per_frame_focal = report.plan.blocks["focal"] == "per_frame"
     valid = int(fit.maps[k].valid.sum())
@@ -255,11 +262,11 @@ def _pose_std(
     """Return six standard deviations; the unit's own uncertainty adds to the translation's."""
     slot = report.plan.slot(block, frame)
     assert slot is not None
-    chart = report.plan.local_to_global(report.fit.optimum.state, frame)
+    chart = report.plan.local_to_global(report.fit.state, frame)
     rows = _local_rows(report.plan, block, frame)
     local = chart[rows] @ covariance @ chart[rows].T
     variance = np.maximum(np.diag(local), 0.0).copy()
-    state = report.fit.optimum.state
+    state = report.fit.state
     poses = state.projector_from_camera if block == "projector_pose" else state.world_from_camera
     variance[3:] += (poses[frame].t * report.unit.std_relative) ** 2
     variance[3:] *= report.unit.factor**2

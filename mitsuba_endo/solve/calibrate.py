@@ -4,6 +4,7 @@ from threadpoolctl import threadpool_limits
 
 from ..geometry.laws import LAWS
 from ..records.calibration import Calibration
+from ..records.checkpoint import Checkpoint
 from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import AUTO_LAW, Rig
@@ -19,6 +20,7 @@ def calibrate(
     rig: Rig,
     options: Options | None = None,
     progress: Progress | None = None,
+    resume: Checkpoint | None = None,
 ) -> Calibration:
     """Calibrate a projector from correspondence maps.
 
@@ -27,6 +29,7 @@ def calibrate(
         rig: what is known, and which unknowns the frames share.
         options: how to solve.
         progress: called with the share of the work done and the name of the step.
+        resume: an earlier calibration of these maps to go on with; its law is kept.
 
     Returns:
         The solution with the surface, the rendered maps and the trace of the optimisation.
@@ -38,11 +41,17 @@ def calibrate(
     say = progress or (lambda _share, _step: None)
     check_maps(maps, rig)
     camera = rig.camera.to_model()
-    laws = list(LAWS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
+    laws = (
+        [resume.law]
+        if resume
+        else list(LAWS)
+        if rig.projector.law == AUTO_LAW
+        else [rig.projector.law]
+    )
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
         fits = [
-            solve(Job(maps, camera, rig, law, options), _part(say, i, len(laws)))
+            solve(Job(maps, camera, rig, law, options, resume), _part(say, i, len(laws)))
             for i, law in enumerate(laws)
         ]
         say(0.9, "Assembling the solution")

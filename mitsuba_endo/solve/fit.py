@@ -6,6 +6,7 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut
 from .optimum import Optimum
 from .problem import Problem
+from .state import State
 from .uncertainty import Uncertainty
 
 
@@ -17,10 +18,20 @@ class Fit:
     maps: list[CorrespondenceMap]
     """The frames that are part of it."""
     left_out: list[LeftOut]
-    problem: Problem
     optimum: Optimum
+    """The calibration."""
+    reported: Optimum
+    """The same with the surface smoothed as it is reported."""
     uncertainty: Uncertainty
     notes: list[str]
     """From the start: what the user should know."""
     timings: dict[str, float]
     """Seconds of every stage."""
+
+    @property
+    def problem(self) -> Problem:
+        return self.reported.objective.problem
+
+    @property
+    def state(self) -> State:
+        return self.reported.state

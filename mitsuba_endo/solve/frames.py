@@ -67,6 +67,21 @@ def usable_starts(
     return kept, starts, left_out
 
 
+def without_repeats(
+    maps: list[CorrespondenceMap],
+) -> tuple[list[CorrespondenceMap], list[LeftOut]]:
+    """Leave out maps that are copies of an earlier one: they add nothing and would count twice."""
+    kept: list[CorrespondenceMap] = []
+    left_out = []
+    for map_ in maps:
+        twin = next((k for k in kept if np.array_equal(k.q, map_.q, equal_nan=True)), None)
+        if twin is None:
+            kept.append(map_)
+        else:
+            left_out.append(LeftOut(name=map_.name, reason=f"it is a copy of {twin.name}"))
+    return kept, left_out
+
+
 def common_start(
     maps: list[CorrespondenceMap], starts: list[Start], camera: CameraModel
 ) -> list[Start]:

@@ -14,7 +14,8 @@ from .lattice import Lattice, lattice_over
 from .optimum import Optimum
 from .options import Options
 from .plan import Plan
-from .problem import Observations, Problem, curvature_prior, make_problem
+from .polish import smooth_surfaces
+from .problem import Observations, Problem, curvature_prior, make_problem, prior_weight
 from .state import INTRINSICS, State
 from .surface_result import render_frames
 
@@ -42,9 +43,9 @@ class FrameStart:
         """(V, 3) vertices of its surface in its camera's frame."""
         return self.lattice.vertices(self.optimum.state.rho[0])
 
-    def range_image(self, camera: CameraModel) -> RangeImage:
+    def range_image(self, camera: CameraModel, options: Options) -> RangeImage:
         """Return what the registration of frames works on."""
-        rendering = render_frames(self.optimum, camera)[0]
+        rendering = render_frames(smooth_surfaces(self.optimum, options), camera)[0]
         return RangeImage(camera.rays(camera.pixel_grid()), rendering.range, camera)
 
 
@@ -53,7 +54,6 @@ def joint_problem(
     placed: list[Registration],
     plan: Plan,
     law: str,
-    options: Options,
 ) -> tuple[Problem, State]:
     """Build the joint problem of frames that were registered; the first one is the world.
 
@@ -62,7 +62,6 @@ def joint_problem(
         placed: where each is, in units of the first one's baseline.
         plan: sharing of the unknowns.
         law: projector law.
-        options: of the surface.
     """
     points = np.concatenate(
         [p.world_from_camera.apply(p.scale * s.points) for s, p in zip(starts, placed, strict=True)]
@@ -76,12 +75,10 @@ def joint_problem(
         _projector_poses(starts, placed, plan),
         _intrinsics(starts, plan),
     )
-    return _problem(starts, lattice, state, plan, law, options), state
+    return _problem(starts, lattice, state, plan, law), state
 
 
-def extended(
-    starts: list[FrameStart], optimum: Optimum, options: Options
-) -> tuple[Problem, State] | None:
+def extended(starts: list[FrameStart], optimum: Optimum) -> tuple[Problem, State] | None:
     """Return the problem with a surface grown to where cameras have moved, or None if it fits.
 
     Rays that miss the surface are taken to end at their frame's median range.
@@ -98,7 +95,7 @@ def extended(
     rho, seen = np.zeros(grown.size), np.zeros(grown.size, bool)
     rho[at], seen[at] = state.rho[0], True
     state = state.with_(rho=[grown.fill(seen, rho)])
-    return _problem(starts, grown, state, old.plan, old.law, options), state
+    return _problem(starts, grown, state, old.plan, old.law), state
 
 
 MISSED_SHARE = 0.01
@@ -121,12 +118,11 @@ def _problem(
     state: State,
     plan: Plan,
     law: str,
-    options: Options,
 ) -> Problem:
     density = float(np.median([len(s.observations.rays) / s.lattice.size for s in starts]))
     focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
     disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
-    prior = curvature_prior(lattice, density, disparity, options.smoothness)
+    prior = curvature_prior(lattice, prior_weight(density), disparity)
     return make_problem([s.observations for s in starts], [lattice], [prior], plan, law)
 
 

@@ -80,8 +80,8 @@ def _block_costs(fit: Fit, sigma: float) -> dict[tuple[str, int], float]:
 
 
 def _prior(fit: Fit, sigma: float) -> float:
+    surfaces = fit.optimum.objective.problem.surfaces
     total = sum(
-        s.prior.cost(rho, sigma)
-        for s, rho in zip(fit.problem.surfaces, fit.optimum.state.rho, strict=True)
+        s.prior.cost(rho, sigma) for s, rho in zip(surfaces, fit.optimum.state.rho, strict=True)
     )
     return total / sigma**2

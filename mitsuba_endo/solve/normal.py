@@ -76,7 +76,7 @@ class NormalEquations:
         """
         root = np.sqrt(weight)
         rows = surface_rows(lin, root, len(self.surfaces[surface].g))
-        local = (lin.J_local * root).transpose(1, 0, 2).reshape(len(chart), -1)
+        local = (lin.J_local * root).transpose(1, 0, 2).reshape(len(chart), 2 * len(root))
         r = (residual * root).ravel()
         block = self.surfaces[surface]
         block.A = block.A + rows.T @ rows
@@ -142,8 +142,8 @@ def _solve_symmetric(S: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[
     """Solve S x = g after scaling the diagonal to one; directions without information stay put."""
     scale = 1 / np.sqrt(np.maximum(np.diag(S), 1e-300))
     values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
-    if values[-1] <= 0:
+    if len(values) and values[-1] <= 0:
         raise np.linalg.LinAlgError("no information")
-    keep = values > 1e-12 * values[-1]
+    keep = values > 1e-12 * values.max(initial=0.0)
     inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
     return scale * (vectors @ (inverse * (vectors.T @ (scale * g))))

@@ -19,14 +19,15 @@ class Options:
     """Distance of the starting plane, in baselines (start = plane)."""
     max_iterations: int = 60
     """Limit for Gauss-Newton."""
-    adam_iterations: int = 3000
+    adam_iterations: int = 20_000
     """Limit for Adam."""
     tolerance: float = 0.1
     """Converged when a step is below this many standard deviations of the unknowns."""
     cell_px: float | None = None
     """Size of a surface cell, camera pixels; default: chosen from the number of observations."""
     smoothness: float = 1.0
-    """Weight of the prior on the surface's curvature, in units of its own estimate."""
+    """Multiplies the weight of the curvature prior on the reported surface; the calibration is not
+    affected."""
     finish: Literal["tukey", "cauchy"] = "tukey"
     """Loss of the last stage: redescending, or Cauchy as published."""
     seed: int = 0

@@ -7,17 +7,20 @@ from dataclasses import dataclass, field
 
 from ..geometry.cameras import CameraModel
 from ..records.calibration import TraceRow
+from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.solution import LeftOut
 from ..start.registration import Registration, register_frames
 from .drift import drift_prior
 from .fit import Fit
-from .frames import common_start, solve_alone, usable_starts
+from .frames import common_start, solve_alone, usable_starts, without_repeats
 from .joint import FrameStart, at_identity, extended, joint_problem
 from .optimum import Optimum
 from .options import Options
 from .plan import make_plan
+from .polish import smooth_surfaces
+from .resume import resumed_maps, resumed_problem
 from .run import OnIteration, Progress, optimise
 from .single import separate_surfaces
 from .state import State
@@ -36,6 +39,8 @@ class Job:
     rig: Rig
     law: str
     options: Options
+    resume: Checkpoint | None = None
+    """Earlier calibration to go on with."""
     timings: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
@@ -53,15 +58,37 @@ def solve(job: Job, say: Progress) -> Fit:
         InputError: no frame can be used, or the plan contradicts itself.
     """
     make_plan(job.rig, len(job.maps))  # a contradiction is told before any work
+    if job.resume is not None:
+        return _resumed(job, job.resume, say)
     if len(job.maps) > 1 and job.rig.share.surface == "shared":
         return _shared_surface(job, say)
     return _own_surfaces(job, say)
 
 
+def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Fit:
+    maps = resumed_maps(checkpoint, job.maps)
+    plan = make_plan(job.rig, len(maps))
+    say(0.1, "Optimising")
+    with job.timed("optimise"):
+        problem, state = resumed_problem(checkpoint, maps, job.camera, plan)
+        optimum = optimise(
+            problem, state, job.options, drift_prior(job.rig, plan), _reporter(job, say, 0.1),
+            checkpoint.stage,
+        )  # fmt: skip
+    left_out = [
+        LeftOut(name=m.name, reason="it was not part of the calibration resumed")
+        for m in job.maps
+        if m not in maps
+    ]
+    return _finish(job, maps, left_out, [], optimum, say)
+
+
 def _own_surfaces(job: Job, say: Progress) -> Fit:
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = usable_starts(job.maps, job.camera, job.rig, job.law, job.options)
+        unique, repeated = without_repeats(job.maps)
+        maps, starts, left_out = usable_starts(unique, job.camera, job.rig, job.law, job.options)
+        left_out += repeated
         plan = make_plan(job.rig, len(maps))
         if len(maps) > 1 and plan.blocks["projector_pose"] != "per_frame":
             starts = common_start(maps, starts, job.camera)
@@ -76,7 +103,9 @@ def _own_surfaces(job: Job, say: Progress) -> Fit:
 def _shared_surface(job: Job, say: Progress) -> Fit:
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = usable_starts(job.maps, job.camera, job.rig, job.law, job.options)
+        unique, repeated = without_repeats(job.maps)
+        maps, starts, left_out = usable_starts(unique, job.camera, job.rig, job.law, job.options)
+        left_out += repeated
     say(0.3, "Solving every frame alone")
     with job.timed("frames"):
         plan = make_plan(job.rig, len(maps))
@@ -100,7 +129,9 @@ def _shared_surface(job: Job, say: Progress) -> Fit:
 def _place(job: Job, alone: list[FrameStart]) -> list[Registration]:
     if job.options.cameras == "identity":
         return at_identity(len(alone))
-    return register_frames([a.range_image(job.camera) for a in alone], seed=job.options.seed)
+    return register_frames(
+        [a.range_image(job.camera, job.options) for a in alone], seed=job.options.seed
+    )
 
 
 def _named(reason: str, alone: list[FrameStart]) -> str:
@@ -114,12 +145,12 @@ def _optimise_joint(
     job: Job, alone: list[FrameStart], placed: list[Registration], say: Progress
 ) -> Optimum:
     plan = make_plan(job.rig, len(alone))
-    problem, state = joint_problem(alone, placed, plan, job.law, job.options)
+    problem, state = joint_problem(alone, placed, plan, job.law)
     extra = drift_prior(job.rig, plan)
     report = _reporter(job, say, 0.6)
     optimum = optimise(problem, state, job.options, extra, report)
     for _ in range(_MAX_EXTENSIONS):
-        grown = extended(alone, optimum, job.options)
+        grown = extended(alone, optimum)
         if grown is None:
             break
         optimum = optimise(*grown, job.options, extra, report)
@@ -146,8 +177,8 @@ def _finish(
     say: Progress,
 ) -> Fit:
     say(0.95, "Computing standard deviations")
+    with job.timed("surface"):
+        reported = smooth_surfaces(optimum, job.options)
     with job.timed("uncertainty"):
         known = uncertainty(optimum, job.options.jackknife)
-    return Fit(
-        job.law, maps, left_out, optimum.objective.problem, optimum, known, notes, job.timings
-    )
+    return Fit(job.law, maps, left_out, optimum, reported, known, notes, job.timings)

@@ -22,9 +22,13 @@ def optimise(
     options: Options,
     extra: GlobalTerm | None = None,
     on_iteration: OnIteration | None = None,
+    stage: int = 0,
 ) -> Optimum:
-    """Minimise the objective from ``state`` with the solver that the options name."""
-    objective = Objective(problem, options.finish, extra)
+    """Minimise the objective from ``state`` with the solver that the options name.
+
+    ``stage`` is where to begin: 1 leaves out the first stage of the robust objective.
+    """
+    objective = Objective(problem, options.finish, extra, stage=stage)
     if options.solver == "adam":
         return Adam(objective, options.adam_iterations, on_iteration).run(state)
     return GaussNewton(objective, options.tolerance, options.max_iterations, on_iteration).run(

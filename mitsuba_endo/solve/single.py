@@ -11,7 +11,7 @@ from .initial import cell_size, initial_rho, observations, smooth_samples
 from .lattice import Lattice, lattice_over
 from .options import Options
 from .plan import Plan
-from .problem import Observations, Problem, curvature_prior, make_problem
+from .problem import Observations, Problem, curvature_prior, make_problem, prior_weight
 from .state import State, intrinsics_vector
 
 
@@ -34,7 +34,7 @@ def separate_surfaces(
         disparity = float(start.projector.focal * np.linalg.norm(start.projector_from_camera.t))
         lattices.append(lattice)
         density = len(frame.rays) / lattice.size
-        priors.append(curvature_prior(lattice, density, disparity, options.smoothness))
+        priors.append(curvature_prior(lattice, prior_weight(density), disparity))
         rho.append(inverse)
     state = State(
         rho,

@@ -37,8 +37,8 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
         factor: solution's unit per baseline.
         inflation: multiplies the formal standard deviation.
     """
-    lattice, rho = fit.problem.surfaces[surface].lattice, fit.optimum.state.rho[surface]
-    seen = support(fit.optimum, surface) >= _SUPPORT
+    lattice, rho = fit.problem.surfaces[surface].lattice, fit.state.rho[surface]
+    seen = support(fit.reported, surface) >= _SUPPORT
     faces = lattice.faces[seen[lattice.faces].all(1)]
     kept, flat = np.unique(faces, return_inverse=True)
     std = inflation * fit.uncertainty.rho_std[surface] / rho**2
