@@ -8,6 +8,7 @@ as triangulation makes it. Units mm and radians.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -262,17 +263,19 @@ class PoseError:
 
 
 def pose_errors(scene: Scene, found: list[Registration], reference: int = 0) -> list[PoseError]:
-    """Compare each frame with the truth, in the frame and baseline of ``reference``.
+    """Compare each frame with the truth, seen from frame ``reference`` and in its baseline.
 
-    Errors of a frame that was left out are NaN, which is not right.
+    Errors are NaN, which is not right, for a frame that was left out, and for all frames if
+    ``reference`` was.
     """
-    errors = []
+    base, errors = found[reference], []
     for k, (pose, image) in enumerate(zip(scene.world_from_camera, scene.images, strict=True)):
-        true = scene.world_from_camera[reference].inverse() @ pose
-        unit, mine = scene.baseline[reference], found[k].world_from_camera
-        if not found[k].reliable:
+        if not (found[k].reliable and base.reliable):
             errors.append(PoseError(*[float("nan")] * 3))
             continue
+        true = scene.world_from_camera[reference].inverse() @ pose
+        mine = base.world_from_camera.inverse() @ found[k].world_from_camera
+        unit = scene.baseline[reference] / base.scale
         mean = float(np.nanmean(image.range)) * scene.baseline[k]
         errors.append(
             PoseError(
@@ -282,3 +285,13 @@ def pose_errors(scene: Scene, found: list[Registration], reference: int = 0) -> 
             )
         )
     return errors
+
+
+def silently_wrong(scene: Scene, found: list[Registration]) -> list[int]:
+    """Return the frames called reliable that are wrong relative to their nearest reliable one.
+
+    That is the relation that was searched for; over a chain right steps may add up to a drift,
+    which the joint solve takes out.
+    """
+    reliable = [k for k, r in enumerate(found) if r.reliable]
+    return [k for j, k in pairwise(reliable) if not pose_errors(scene, found, j)[k].right]

@@ -53,7 +53,8 @@ def register_frames(
     """Place all frames in one world.
 
     Neighbouring frames may be some 25 mm and 15 degrees apart at a distance of 70 mm, in any
-    direction, and their units may differ by some 15 %. No guess is needed.
+    direction, and their units may differ by some 15 %. No guess is needed. Placements are chained,
+    not adjusted over loops: errors of some 0.4 degrees and 0.8 % of the range a step add up.
 
     Args:
         images: range images, each in its own unit (its baseline).
