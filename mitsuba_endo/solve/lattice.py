@@ -7,6 +7,7 @@ rho = 1 / |X| of every vertex, in which correspondences are nearly linear.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -44,7 +45,7 @@ class Lattice:
         """Return the (V, 3) vertex positions for inverse ranges (V,)."""
         return self.directions / rho[:, None]
 
-    @property
+    @cached_property
     def bandwidth(self) -> int:
         """Largest difference of indices that the smoothness couples."""
         triples = self.second_differences().indices.reshape(-1, 3)
