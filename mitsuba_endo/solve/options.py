@@ -21,7 +21,7 @@ class Options:
     """Limit for Gauss-Newton."""
     adam_iterations: int = 20_000
     """Limit for Adam."""
-    tolerance: float = 0.1
+    tolerance: float = 0.2
     """Converged when a step is below this many standard deviations of the unknowns."""
     cell_px: float | None = None
     """Size of a surface cell, camera pixels; default: chosen from the number of observations."""
