@@ -1,0 +1,124 @@
+"""Lattice surfaces against brute force."""
+
+import numpy as np
+import pytest
+
+from mitsuba_endo.solve.lattice import (
+    Lattice,
+    equidistant_coordinates,
+    equidistant_direction,
+    lattice_over,
+)
+
+CELL = 0.05
+
+
+def cap(width: float, height: float, seed: int = 0) -> np.ndarray:
+    """Directions spread over an off-centre rectangle of the equidistant map, with a corner cut."""
+    rng = np.random.default_rng(seed)
+    ab = rng.uniform([-0.3 * width, -0.6 * height], [0.7 * width, 0.4 * height], (4000, 2))
+    cut = (ab[:, 0] > 0.4 * width) & (ab[:, 1] > 0.1 * height)
+    return equidistant_direction(ab[~cut])
+
+
+@pytest.fixture(params=[(1.0, 0.4), (0.4, 1.0)], ids=["wide", "high"])
+def lattice(request: pytest.FixtureRequest) -> Lattice:
+    return lattice_over(cap(*request.param), CELL, margin=0)
+
+
+def test_equidistant_maps_round_trip():
+    """Oracle: the inverse map, also behind the camera; the radius is the angle to the axis."""
+    rng = np.random.default_rng(1)
+    theta, phi = rng.uniform(0, 3.1, 500), rng.uniform(0, 2 * np.pi, 500)
+    ab = theta[:, None] * np.stack([np.cos(phi), np.sin(phi)], 1)
+    d = equidistant_direction(ab)
+    np.testing.assert_allclose(np.linalg.norm(d, axis=1), 1, atol=1e-14)
+    np.testing.assert_allclose(np.arccos(d[:, 2]), theta, atol=1e-7)
+    np.testing.assert_allclose(equidistant_coordinates(d), ab, atol=1e-12)
+    np.testing.assert_array_equal(equidistant_coordinates(np.array([[0.0, 0, 1]])), [[0, 0]])
+
+
+def test_every_direction_lies_in_a_cell_whose_corners_are_vertices():
+    """Oracle: floor of the equidistant coordinates; with a margin the neighbours' corners too."""
+    d = cap(1.0, 0.4)
+    for margin in (0, 2):
+        lattice = lattice_over(d, CELL, margin)
+        have = {tuple(v) for v in lattice.ij}
+        cells = np.unique(np.floor(equidistant_coordinates(d) / CELL).astype(int), axis=0)
+        for dx in range(-margin, margin + 2):
+            for dy in range(-margin, margin + 2):
+                assert {tuple(c) for c in cells + np.array([dx, dy])} <= have
+
+
+def test_triangles_tile_the_cells_and_face_one_way(lattice: Lattice):
+    """Oracle: two triangles a cell, of area cell^2 / 2, with normals away from the centre."""
+    ab = lattice.coordinates[lattice.faces]
+    e, f = ab[:, 1] - ab[:, 0], ab[:, 2] - ab[:, 0]
+    np.testing.assert_allclose(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0], CELL**2, rtol=1e-9)
+    wide = np.ptp(lattice.ij[:, 0]) > np.ptp(lattice.ij[:, 1])
+    d = cap(1.0, 0.4) if wide else cap(0.4, 1.0)
+    cells = np.unique(np.floor(equidistant_coordinates(d) / CELL), axis=0)
+    assert len(lattice.faces) == 2 * len(cells)
+    corners = lattice.vertices(np.full(lattice.size, 0.2))[lattice.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((normal * corners[:, 0]).sum(1) > 0).all()
+    assert len(np.unique(np.sort(lattice.faces, 1), axis=0)) == len(lattice.faces)
+    assert set(lattice.faces.ravel()) == set(range(lattice.size))
+
+
+def test_vertices_have_the_inverse_range(lattice: Lattice):
+    """Oracle: |X| = 1 / rho along the direction."""
+    rho = np.random.default_rng(2).uniform(0.05, 0.3, lattice.size)
+    X = lattice.vertices(rho)
+    np.testing.assert_allclose(np.linalg.norm(X, axis=1), 1 / rho)
+    np.testing.assert_allclose(X * rho[:, None], lattice.directions, atol=1e-12)
+
+
+def test_second_differences(lattice: Lattice):
+    """Oracle: zero on functions linear in the lattice coordinates, 2 a on a i^2, none on i j."""
+    D = lattice.second_differences()
+    i, j = lattice.ij.T.astype(float)
+    np.testing.assert_allclose(D @ (3 - 0.7 * i + 0.2 * j), 0, atol=1e-12)
+    np.testing.assert_allclose(D @ (i * j), 0, atol=1e-10)
+    square = D @ (i * i)
+    assert set(np.round(square, 9)) == {0.0, 2.0}
+    have = {tuple(v) for v in lattice.ij}
+    along = sum((x + 1, y) in have and (x - 1, y) in have for x, y in have)
+    across = sum((x, y + 1) in have and (x, y - 1) in have for x, y in have)
+    assert D.shape == (along + across, lattice.size)
+    assert (square == 2).sum() == along
+
+
+def test_bandwidth_bounds_what_is_coupled(lattice: Lattice):
+    """Oracle: the largest index difference in D^T D and among the corners of a triangle."""
+    D = lattice.second_differences()
+    row, col = (D.T @ D).tocoo().coords
+    corners = np.ptp(lattice.faces, axis=1).max()
+    assert lattice.bandwidth >= max(np.abs(row - col).max(), corners)
+    # Numbered along the short side: three rows of it at most.
+    short = int(np.ptp(lattice.ij, axis=0).min()) + 1
+    assert lattice.bandwidth <= 3 * short
+
+
+def test_nearest(lattice: Lattice):
+    """Oracle: the smallest distance in the equidistant map; -1 beyond half a cell."""
+    rng = np.random.default_rng(3)
+    low, high = lattice.coordinates.min(0) - 0.1, lattice.coordinates.max(0) + 0.1
+    ab = rng.uniform(low, high, (600, 2))
+    distance = np.abs(ab[:, None] - lattice.coordinates).max(-1)
+    expected = np.where(distance.min(1) <= CELL / 2, distance.argmin(1), -1)
+    found = lattice.nearest(equidistant_direction(ab))
+    np.testing.assert_array_equal(found, expected)
+    assert set(np.sign(found)) >= {-1, 1}
+
+
+def test_fill(lattice: Lattice):
+    """Oracle: brute-force search of the nearest seen vertex; seen ones keep their value."""
+    rng = np.random.default_rng(4)
+    seen = rng.random(lattice.size) < 0.1
+    rho = np.where(seen, rng.uniform(0.1, 0.3, lattice.size), np.nan)
+    filled = lattice.fill(seen, rho)
+    np.testing.assert_array_equal(filled[seen], rho[seen])
+    gap = np.linalg.norm(lattice.ij[:, None] - lattice.ij[seen], axis=-1)
+    for v in range(lattice.size):
+        assert filled[v] in rho[seen][gap[v] <= gap[v].min() + 1e-9]
