@@ -1,0 +1,49 @@
+"""Benchmarks: pairs measured in one run, printed with unit and direction, and saved.
+
+python scripts/benchmark.py --out benchmark-output [--only NAME]... [--quick]
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from benchmarks import bundle_adjustment, emitter_cost, first_order, full_resolution, real_captures
+from benchmarks.report import Figure, save, show
+from rich.console import Console
+
+from mitsuba_endo import backend
+
+BENCHMARKS = {
+    module.NAME: module
+    for module in (bundle_adjustment, first_order, full_resolution, emitter_cost, real_captures)
+}
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder for benchmark.json and benchmark.csv.")] = Path(
+        "benchmark-output"
+    ),
+    only: Annotated[
+        list[str] | None, typer.Option(help=f"Run these alone: {', '.join(BENCHMARKS)}.")
+    ] = None,
+    quick: Annotated[bool, typer.Option(help="Small inputs, to see that it runs.")] = False,
+) -> None:
+    """Run the benchmarks and report their figures."""
+    unknown = set(only or ()) - set(BENCHMARKS)
+    if unknown:
+        raise typer.BadParameter(f"no benchmark {', '.join(sorted(unknown))}", param_hint="--only")
+    backend.use()
+    console = Console()
+    figures: list[Figure] = []
+    for name in only or BENCHMARKS:
+        console.print(f"[bold]{name}[/]: {(BENCHMARKS[name].__doc__ or '').splitlines()[0]}")
+        figures += BENCHMARKS[name].run(quick)
+    if not figures:
+        console.print("Nothing was measured: the input of these benchmarks is absent.")
+        return
+    show(figures, console)
+    save(figures, out)
+
+
+if __name__ == "__main__":
+    typer.run(main)
