@@ -19,6 +19,8 @@ WEAK, UNOBSERVABLE = 0.01, 0.1
 """Standard deviations, in natural scales, from which on an unknown is weak or unobservable."""
 _MIXED = 0.25
 """Share of the largest component from which on an unknown counts as part of a direction."""
+_DRAGGED = 0.05
+"""The same for an unknown that the direction alone makes weak."""
 _FLAT = 0.02
 """Depth relief over lateral extent below which a surface counts as nearly planar."""
 
@@ -102,7 +104,8 @@ def free_directions(
             break
         share = np.abs(vector) / np.abs(vector).max()
         order = np.argsort(-share)
-        mixes = [names[i].words(plan) for i in order if share[i] > _MIXED]
+        least = np.where(np.abs(vector) * std >= WEAK, _DRAGGED, _MIXED)
+        mixes = [names[i].words(plan) for i in order if share[i] > least[i]]
         out.append(Direction(std, mixes))
     return out
 
