@@ -28,52 +28,60 @@ _ROUNDING = 1e-12
 
 
 def solution_table(solution: "Solution") -> "Table":
-    """List every unknown of the projector and every frame's baseline and residual, with units."""
-    table = _table("Calibration", "Quantity", "Value", "Std", "Unit", "Status")
+    """List the unknowns with their units; poses axis by axis for one frame, else a row a frame."""
+    table = _table("Calibration", "Quantity", "Value", "± std", "Unit", "Status")
     projector = solution.projector
     for name, unit in (
         ("focal", "pattern px"), ("centre", "pattern px"), ("aspect", "fy/fx"), ("distortion", ""),
     ):  # fmt: skip
-        _estimate_row(table, f"projector {name}", getattr(projector, name), unit)
+        _estimate_rows(table, name, getattr(projector, name), unit)
     for frame in solution.frames:
+        table.add_section()
+        table.add_row(f"[bold]{frame.name}[/]", "", "", "", "")
         if frame.focal is not None:
-            _estimate_row(table, f"{frame.name}: focal", frame.focal, "pattern px")
-        _pose_rows(table, frame.name, frame.projector_from_camera, solution.units)
+            _estimate_rows(table, "focal", frame.focal, "pattern px")
+        _pose_rows(table, frame.projector_from_camera, solution.units, len(solution.frames) > 1)
         if frame.rms_px is not None:
-            used = "" if frame.used is None else f"{frame.used} correspondences"
-            rms = f"{frame.rms_px:.3f}"
-            table.add_row(f"{frame.name}: residual RMS", rms, "", "pattern px", used)
+            used = "" if frame.used is None else f"{frame.used} pixels"
+            table.add_row("residual RMS", f"{frame.rms_px:.3f}", "", "pattern px", used)
     for left in solution.left_out:
-        table.add_row(f"{left.name}", "left out", "", "", left.reason)
+        table.add_section()
+        table.add_row(f"[bold]{left.name}[/]", "left out", "", "", "")
     return table
 
 
-def _estimate_row(table: "Table", name: str, estimate: "Estimate", unit: str) -> None:
-    if estimate.value == []:
+def _estimate_rows(table: "Table", name: str, estimate: "Estimate", unit: str) -> None:
+    if not isinstance(estimate.value, list):
+        std = numbers(estimate.std, 2)
+        table.add_row(name, numbers(estimate.value), std, unit, estimate.status)
         return
-    status = estimate.status + (f": {estimate.reason}" if estimate.reason else "")
-    table.add_row(name, numbers(estimate.value), numbers(estimate.std, 2), unit, status)
+    stds = estimate.std if isinstance(estimate.std, list) else [None] * len(estimate.value)
+    parts = "xy" if name == "centre" else [str(i + 1) for i in range(len(estimate.value))]
+    for part, value, std in zip(parts, estimate.value, stds, strict=True):
+        table.add_row(f"{name} {part}", numbers(value), numbers(std, 2), unit, estimate.status)
 
 
-def _pose_rows(table: "Table", frame: str, pose: "PoseEstimate", unit: str) -> None:
+def _pose_rows(table: "Table", pose: "PoseEstimate", unit: str, short: bool) -> None:
     transform = pose.to_transform()
-    status = pose.status + (f": {pose.reason}" if pose.reason else "")
     if transform is None:
-        table.add_row(f"{frame}: projector pose", "-", "", "", status)
+        table.add_row("projector pose", "-", "", "", pose.status)
         return
-    std = pose.std or [None] * 6
-    rotation = [None if s is None else float(np.degrees(s)) for s in std[:3]]
-    vector = np.degrees(_rotation_vector(transform.R)).tolist()
-    table.add_row(f"{frame}: projector rotation", numbers(vector), _listed(rotation), "deg", status)
-    t = transform.t.tolist()
-    table.add_row(f"{frame}: projector translation", numbers(t), _listed(std[3:]), unit, status)
-    table.add_row(f"{frame}: baseline", f"{np.linalg.norm(transform.t):.4g}", "", unit, "")
+    if not short:
+        std = pose.std or [None] * 6
+        degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
+        for axis, value, s in zip("xyz", _rotation_degrees(transform.R), degrees, strict=True):
+            name = f"projector rotation {axis}"
+            table.add_row(name, numbers(value, 5), numbers(s, 2), "deg", pose.status)
+        for axis, value, s in zip("xyz", transform.t.tolist(), std[3:], strict=True):
+            name = f"projector translation {axis}"
+            table.add_row(name, numbers(value, 5), numbers(s, 2), unit, pose.status)
+    table.add_row("baseline", f"{np.linalg.norm(transform.t):.5g}", "", unit, pose.status)
 
 
-def _rotation_vector(R: np.ndarray) -> np.ndarray:
+def _rotation_degrees(R: np.ndarray) -> list[float]:
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_matrix(R).as_rotvec()
+    return np.degrees(Rotation.from_matrix(R).as_rotvec()).tolist()
 
 
 def numbers(value: float | list[float] | None, digits: int = 6) -> str:
@@ -83,11 +91,6 @@ def numbers(value: float | list[float] | None, digits: int = 6) -> str:
     if isinstance(value, list):
         return ", ".join(numbers(v, digits) for v in value)
     return "0" if abs(value) < _ROUNDING else f"{value:.{digits}g}"
-
-
-def _listed(values: list[float] | list[None] | list[float | None]) -> str:
-    known = [v for v in values if v is not None]
-    return numbers(known, 2) if len(known) == len(values) else "-"
 
 
 def _table(title: str, *columns: str) -> "Table":
@@ -101,23 +104,26 @@ def _table(title: str, *columns: str) -> "Table":
 
 def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     """Set what was found beside the truth, for the first frame."""
-    table = _table("Projector, found and true", "Quantity", "Found", "Std", "True", "Unit")
+    table = _table("Projector, found and true", "Quantity", "Found", "± std", "True", "Unit")
     focal, true_focal = solution.projector.focal, truth.projector.focal
     table.add_row(
         "focal length", numbers(focal.value), numbers(focal.std, 2),
         numbers(true_focal.value), "pattern px",
     )  # fmt: skip
-    found, true = (s.frames[0].projector_from_camera for s in (solution, truth))
-    poses = found.to_transform(), true.to_transform()
-    std = found.std or [None] * 6
-    if poses[0] is not None and poses[1] is not None:
-        R, R_true = (np.degrees(_rotation_vector(pose.R)).tolist() for pose in poses if pose)
-        degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
-        row = numbers(R, 4), _listed(degrees), numbers(R_true, 4), "deg"
-        table.add_row("rotation vector", *row)
-        t, t_true = (pose.t.tolist() for pose in poses if pose)
-        row = numbers(t, 4), _listed(std[3:]), numbers(t_true, 4), solution.units
-        table.add_row("translation", *row)
+    estimate = solution.frames[0].projector_from_camera
+    found, true = (s.frames[0].projector_from_camera.to_transform() for s in (solution, truth))
+    if found is None or true is None:
+        return table
+    std = estimate.std or [None] * 6
+    degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
+    angles = zip("xyz", _rotation_degrees(found.R), degrees, _rotation_degrees(true.R), strict=True)
+    for axis, value, s, is_true in angles:
+        row = numbers(value, 4), numbers(s, 2), numbers(is_true, 4), "deg"
+        table.add_row(f"rotation {axis}", *row)
+    lengths = zip("xyz", found.t.tolist(), std[3:], true.t.tolist(), strict=True)
+    for axis, value, s, is_true in lengths:
+        row = numbers(value, 4), numbers(s, 2), numbers(is_true, 4), solution.units
+        table.add_row(f"translation {axis}", *row)
     return table
 
 

@@ -162,6 +162,7 @@ def rig_section(
         label = "projector and its axis" if i == 0 else None
         axes.plot(pose.t[0], pose.t[2], "s", ms=4, color=PROJECTOR, label=label)
     axes.set_aspect("equal", adjustable="datalim")
+    axes.locator_params(nbins=5)  # more labels run into one another in a narrow panel
     axes.set(xlabel=f"x, {unit}", ylabel=f"z, {unit}", title="Rig from above")
     axes.legend(fontsize="x-small", loc="best")
     axes.grid(color="0.9", lw=0.6)

@@ -14,6 +14,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy import ndimage
 
+_OFFSET = np.array([0.381966, 0.276393])
+"""Shift of the lattice in cells: edges through the optical axis would meet whole lines of pixel
+rays, and a ray along an edge can slip between two triangles."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
@@ -34,7 +38,7 @@ class Lattice:
     @property
     def coordinates(self) -> NDArray[np.float64]:
         """(V, 2) equidistant coordinates (a, b), radians."""
-        return (self.ij * self.cell).astype(np.float64)
+        return ((self.ij + _OFFSET) * self.cell).astype(np.float64)
 
     @property
     def directions(self) -> NDArray[np.float64]:
@@ -70,7 +74,7 @@ class Lattice:
     def nearest(self, directions: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the index of the vertex nearest to each direction (N, 3), -1 where none is."""
         index = self._index()
-        at = np.round(equidistant_coordinates(directions) / self.cell).astype(np.int64)
+        at = np.round(equidistant_coordinates(directions) / self.cell - _OFFSET).astype(np.int64)
         column, row = (at - self.ij.min(0)).T
         inside = (column >= 0) & (row >= 0) & (column < index.shape[1]) & (row < index.shape[0])
         return np.where(inside, index[np.where(inside, row, 0), np.where(inside, column, 0)], -1)
@@ -106,7 +110,9 @@ def lattice_over(directions: NDArray[np.float64], cell: float, margin: int = 1) 
         cell: lattice spacing, radians.
         margin: cells added around, held by smoothness alone.
     """
-    ij = np.unique(np.floor(equidistant_coordinates(directions) / cell).astype(np.int64), axis=0)
+    ij = np.unique(
+        np.floor(equidistant_coordinates(directions) / cell - _OFFSET).astype(np.int64), axis=0
+    )
     low = ij.min(0) - margin
     columns, rows = np.ptp(ij, axis=0) + 1 + 2 * margin
     cells = np.zeros((int(rows), int(columns)), bool)
