@@ -74,7 +74,7 @@ class Lattice:
     def nearest(self, directions: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the index of the vertex nearest to each direction (N, 3), -1 where none is."""
         index = self._index()
-        at = np.round(equidistant_coordinates(directions) / self.cell - _OFFSET).astype(np.int64)
+        at = np.round(lattice_position(directions, self.cell)).astype(np.int64)
         column, row = (at - self.ij.min(0)).T
         inside = (column >= 0) & (row >= 0) & (column < index.shape[1]) & (row < index.shape[0])
         return np.where(inside, index[np.where(inside, row, 0), np.where(inside, column, 0)], -1)
@@ -110,9 +110,7 @@ def lattice_over(directions: NDArray[np.float64], cell: float, margin: int = 1) 
         cell: lattice spacing, radians.
         margin: cells added around, held by smoothness alone.
     """
-    ij = np.unique(
-        np.floor(equidistant_coordinates(directions) / cell - _OFFSET).astype(np.int64), axis=0
-    )
+    ij = np.unique(np.floor(lattice_position(directions, cell)).astype(np.int64), axis=0)
     low = ij.min(0) - margin
     columns, rows = np.ptp(ij, axis=0) + 1 + 2 * margin
     cells = np.zeros((int(rows), int(columns)), bool)
@@ -137,6 +135,11 @@ def _triangulate(index: NDArray[np.int64], cells: NDArray[np.bool_]) -> NDArray[
     a, b = index[:-1, :-1][cells], index[:-1, 1:][cells]
     c, d = index[1:, :-1][cells], index[1:, 1:][cells]
     return np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])
+
+
+def lattice_position(directions: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+    """Return where unit directions (..., 3) lie on a lattice, in cells (..., 2)."""
+    return equidistant_coordinates(directions) / cell - _OFFSET
 
 
 def equidistant_coordinates(directions: NDArray[np.float64]) -> NDArray[np.float64]:

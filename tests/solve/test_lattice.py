@@ -8,6 +8,7 @@ from mitsuba_endo.solve.lattice import (
     equidistant_coordinates,
     equidistant_direction,
     lattice_over,
+    lattice_position,
 )
 
 CELL = 0.05
@@ -39,12 +40,12 @@ def test_equidistant_maps_round_trip():
 
 
 def test_every_direction_lies_in_a_cell_whose_corners_are_vertices():
-    """Oracle: floor of the equidistant coordinates; with a margin the neighbours' corners too."""
+    """Oracle: floor of the position in cells; with a margin the neighbours' corners too."""
     d = cap(1.0, 0.4)
     for margin in (0, 2):
         lattice = lattice_over(d, CELL, margin)
         have = {tuple(v) for v in lattice.ij}
-        cells = np.unique(np.floor(equidistant_coordinates(d) / CELL).astype(int), axis=0)
+        cells = np.unique(np.floor(lattice_position(d, CELL)).astype(int), axis=0)
         for dx in range(-margin, margin + 2):
             for dy in range(-margin, margin + 2):
                 assert {tuple(c) for c in cells + np.array([dx, dy])} <= have
@@ -57,7 +58,7 @@ def test_triangles_tile_the_cells_and_face_one_way(lattice: Lattice):
     np.testing.assert_allclose(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0], CELL**2, rtol=1e-9)
     wide = np.ptp(lattice.ij[:, 0]) > np.ptp(lattice.ij[:, 1])
     d = cap(1.0, 0.4) if wide else cap(0.4, 1.0)
-    cells = np.unique(np.floor(equidistant_coordinates(d) / CELL), axis=0)
+    cells = np.unique(np.floor(lattice_position(d, CELL)), axis=0)
     assert len(lattice.faces) == 2 * len(cells)
     corners = lattice.vertices(np.full(lattice.size, 0.2))[lattice.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
