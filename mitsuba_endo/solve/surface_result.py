@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..records.calibration import FrameMaps, SurfaceEstimate
 from .fit import Fit
+from .lattice import Lattice
 from .linearise import FrameRenderer
 from .optimum import Optimum
 
@@ -15,6 +16,11 @@ USED_WEIGHT = 0.1
 """Robust weight above which a correspondence counts as used."""
 _SUPPORT = 1.0
 """Sum of the robust weights around a vertex from which on it counts as seen."""
+_STEEP = 4.0
+"""Rise of the range over the cell's width, the tangent of 76 degrees, from which on a triangle
+may be the bridge over a depth step."""
+_AGREE = 0.5
+"""Mean robust weight of the observations on a triangle below which they contradict it."""
 
 
 def support(optimum: Optimum, surface: int) -> NDArray[np.float64]:
@@ -28,6 +34,34 @@ def support(optimum: Optimum, surface: int) -> NDArray[np.float64]:
     return total
 
 
+def seen_faces(optimum: Optimum, surface: int) -> NDArray[np.bool_]:
+    """Return which triangles (F,) of a surface were seen.
+
+    All corners need support; a triangle that bridges a depth step, steep and with observations
+    that contradict it, is none of the surface.
+    """
+    lattice, rho = optimum.objective.problem.surfaces[surface].lattice, optimum.state.rho[surface]
+    corners = lattice.faces
+    weight, count = np.zeros(len(corners)), np.zeros(len(corners))
+    for k, lin in enumerate(optimum.evaluation.linearisations):
+        if optimum.objective.problem.plan.surface_of(k) == surface:
+            face = _face_index(lattice, lin.triangles[lin.hit])
+            weight += np.bincount(face, optimum.weights[k][lin.hit], len(corners))
+            count += np.bincount(face, minlength=len(corners))
+    range_ = 1 / rho[corners]
+    steep = np.ptp(range_, axis=1) > _STEEP * lattice.cell * range_.mean(1)
+    bridges = steep & (weight < _AGREE * np.maximum(count, 1))
+    return (support(optimum, surface)[corners] >= _SUPPORT).all(1) & ~bridges
+
+
+def _face_index(lattice: Lattice, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the index of the face that each row of vertex triples (N, 3) is."""
+    place = np.array([lattice.size**2, lattice.size, 1])
+    keys = lattice.faces @ place
+    order = np.argsort(keys)
+    return order[np.searchsorted(keys, triangles @ place, sorter=order)]
+
+
 def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) -> SurfaceEstimate:
     """Return the seen part of a surface.
 
@@ -38,8 +72,7 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
         inflation: multiplies the formal standard deviation.
     """
     lattice, rho = fit.problem.surfaces[surface].lattice, fit.state.rho[surface]
-    seen = support(fit.reported, surface) >= _SUPPORT
-    faces = lattice.faces[seen[lattice.faces].all(1)]
+    faces = lattice.faces[seen_faces(fit.reported, surface)]
     kept, flat = np.unique(faces, return_inverse=True)
     std = inflation * fit.uncertainty.rho_std[surface] / rho**2
     return SurfaceEstimate(
@@ -69,9 +102,11 @@ def render_frames(optimum: Optimum, camera: CameraModel) -> list[Rendering]:
     out = []
     for k, old in enumerate(problem.renderers):
         s = problem.plan.surface_of(k)
+        first = problem.surfaces[s].lattice.faces[0]
         renderer = FrameRenderer(old.scene, rays[finite], problem.law, old.at_centre)
         coordinates, distance, triangles, hit = renderer.render(state, k, s)
-        seen = hit & (support(optimum, s)[triangles] >= _SUPPORT).all(1)
+        face = _face_index(problem.surfaces[s].lattice, np.where(hit[:, None], triangles, first))
+        seen = hit & seen_faces(optimum, s)[face]
         q = np.full((len(rays), 2), np.nan, np.float32)
         q[finite] = np.where(seen, coordinates, np.nan).T
         range_ = np.full(len(rays), np.nan)
