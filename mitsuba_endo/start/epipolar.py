@@ -119,7 +119,7 @@ def residuals(pose: RigidTransform, rays: Vectors, seen: Bearings) -> Residuals:
     e = dot(seen.b, normal)
     e_u, e_v = dot(seen.b_u, normal), dot(seen.b_v, normal)
     # At the epipole every direction fits: a tiny floor makes that 0 / floor instead of 0 / 0.
-    slope = np.sqrt(e_u * e_u + e_v * e_v) + 1e-300
+    slope = np.sqrt(e_u * e_u + e_v * e_v) + 1e-100
     return Residuals(e / slope, slope, (e_u / slope, e_v / slope), turned)
 
 
