@@ -18,9 +18,9 @@ def check_maps(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
     """Refuse maps that cannot belong to the rig.
 
     Raises:
-        InputError: no map, two frames of one name, map and camera of different size, fewer than
-            50 correspondences, coordinates mostly outside the pattern, or a known distance
-            between points that are not in the maps; names the map and the rig's field.
+        InputError: no map, two frames of one name, map and camera of different size, no map
+            without a :func:`fault`, or a known distance between points that are not in the maps;
+            names the map and the rig's field.
     """
     if not maps:
         raise InputError("no correspondence map is given", todo="give at least one")
@@ -30,9 +30,24 @@ def check_maps(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
         raise InputError("two frames have this name", twice[0], "rename one file")
     for map_ in maps:
         _check_size(map_, rig)
+    faults = [fault(map_, rig) for map_ in maps]
+    if faults[0] is not None and None not in faults:
+        raise faults[0]
+    _check_known_distance(maps, rig)
+
+
+def fault(map_: CorrespondenceMap, rig: Rig) -> InputError | None:
+    """Return what makes a map useless, or None: such a frame is left out if others are sound.
+
+    A map has a fault if it has fewer than 50 correspondences, or coordinates mostly outside the
+    pattern.
+    """
+    try:
         _check_count(map_)
         _check_units(map_, rig)
-    _check_known_distance(maps, rig)
+    except InputError as error:
+        return error
+    return None
 
 
 def _check_size(map_: CorrespondenceMap, rig: Rig) -> None:

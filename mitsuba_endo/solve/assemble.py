@@ -34,6 +34,7 @@ from .observability import (
 )
 from .options import Options
 from .plan import Plan
+from .redundancy import redundancy_warnings
 from .resume import checkpoint_of
 from .scale import Unit, resolve_unit
 from .state import INTRINSICS
@@ -86,7 +87,8 @@ def assemble(
         InputError: the scale cannot be resolved.
     """
     renderings = render_frames(fit.reported, camera)
-    unit = resolve_unit(rig, camera, [r.range for r in renderings])
+    seen = {m.name: r.range for m, r in zip(fit.maps, renderings, strict=True)}
+    unit = resolve_unit(rig, camera, [seen.get(name) for name in fit.given])
     report = _report(fit, unit)
     surfaces = [
         surface_estimate(fit, i, unit.factor, _inflation(fit))
@@ -108,7 +110,7 @@ def assemble(
         timings=fit.timings,
         versions=versions(),
         configuration={"options": asdict(options), "rig": rig.model_dump(mode="json")},
-        warnings=[*fit.notes, *(warnings or []), *_warnings(fit)],
+        warnings=[*fit.notes, *(warnings or []), *_warnings(report)],
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(
@@ -282,12 +284,19 @@ def _local_rows(plan: Plan, block: str, frame: int) -> slice:
     return slice(start, start + plan.local_width(block))
 
 
-def _warnings(fit: Fit) -> list[str]:
-    out = []
+def _warnings(report: Report) -> list[str]:
+    fit = report.fit
+    out = [report.unit.warning] if report.unit.warning else []
     if fit.optimum.outcome in (Outcome.MAX_ITERATIONS, Outcome.STALLED):
         out.append("the optimisation had not converged; do not trust the values")
     out += [f"frame {f.name} was left out: {f.reason}" for f in fit.left_out]
-    return out
+    plan = report.plan
+    if plan.frames > 1 and plan.surface == plan.blocks["projector_pose"] == "per_frame":
+        out.append(
+            "frames that share neither surface nor projector pose each have a scale of their own: "
+            "every baseline is taken to be as long as the first"
+        )
+    return out + redundancy_warnings(fit.maps, fit.uncertainty.sigma)
 
 
 def _listed(items: list[str]) -> str:

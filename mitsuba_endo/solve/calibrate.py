@@ -8,7 +8,9 @@ from ..records.checkpoint import Checkpoint
 from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import AUTO_LAW, Rig
+from ..records.solution import Outcome
 from .assemble import assemble
+from .fit import Fit
 from .law_evidence import choose_law
 from .options import Options
 from .pipeline import Job, solve
@@ -50,10 +52,13 @@ def calibrate(
     )
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
-        fits = [
-            solve(Job(maps, camera, rig, law, options, resume), _part(say, i, len(laws)))
-            for i, law in enumerate(laws)
-        ]
+        fits: list[Fit] = []
+        for i, law in enumerate(laws):
+            job = Job(maps, camera, rig, law, options, resume)
+            fits.append(solve(job, _part(say, i, len(laws))))
+            if fits[-1].optimum.outcome is Outcome.INTERRUPTED:
+                fits = fits[-1:]  # the user wants to go on with this one
+                break
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
         return assemble(fit, camera, rig, options, evidence, warnings)

@@ -18,6 +18,8 @@ class Fit:
     maps: list[CorrespondenceMap]
     """The frames that are part of it."""
     left_out: list[LeftOut]
+    given: list[str]
+    """Names of all frames given, in order."""
     optimum: Optimum
     """The calibration."""
     reported: Optimum

@@ -4,9 +4,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.cameras import CameraModel
+from ..records.consistency import fault
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
-from ..records.solution import LeftOut
+from ..records.solution import LeftOut, Outcome
 from ..start.clean import clean_map
 from ..start.known import known_start
 from ..start.plane import plane_start
@@ -65,6 +66,15 @@ def usable_starts(
     if not kept and failure is not None:
         raise failure
     return kept, starts, left_out
+
+
+def without_faults(
+    maps: list[CorrespondenceMap], rig: Rig
+) -> tuple[list[CorrespondenceMap], list[LeftOut]]:
+    """Leave out maps that cannot belong to the rig."""
+    faults = [fault(map_, rig) for map_ in maps]
+    left_out = [LeftOut(name=m.name, reason=f.what) for m, f in zip(maps, faults, strict=True) if f]
+    return [m for m, f in zip(maps, faults, strict=True) if f is None], left_out
 
 
 def without_repeats(
@@ -126,9 +136,16 @@ def solve_alone(
     law: str,
     options: Options,
 ) -> list[FrameStart]:
-    """Optimise every frame alone, with the blocks that the plan frees."""
+    """Optimise every frame alone, with the blocks that the plan frees.
+
+    Raises:
+        KeyboardInterrupt: the user stopped: there is nothing yet to go on from.
+    """
     out = []
     for map_, start in zip(maps, starts, strict=True):
         problem, state = separate_surfaces([map_], [start], camera, single_plan(plan), law, options)
-        out.append(FrameStart(map_.name, optimise(problem, state, options)))
+        optimum = optimise(problem, state, options)
+        if optimum.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        out.append(FrameStart(map_.name, optimum))
     return out

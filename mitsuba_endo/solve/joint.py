@@ -23,6 +23,11 @@ MARGIN = 3
 """Cells added around what the frames see: small steps of the cameras then stay on the surface."""
 
 
+FINEST = 0.5
+"""Least spacing of the common surface relative to that of the first frame alone: half of it
+quadruples the vertices."""
+
+
 @dataclass(frozen=True, eq=False)
 class FrameStart:
     """One frame solved alone, in units of its own baseline."""
@@ -68,17 +73,34 @@ def joint_problem(
     )
     ranges = np.linalg.norm(points, axis=1)
     directions = points / ranges[:, None]
-    lattice = lattice_over(directions, starts[0].lattice.cell, MARGIN)
+    lattice = lattice_over(directions, _cell(starts, placed), MARGIN)
     state = State(
         [initial_rho(lattice, directions, ranges)],
         [p.world_from_camera for p in placed],
         _projector_poses(starts, placed, plan),
         _intrinsics(starts, plan),
     )
-    return _problem(starts, lattice, state, plan, law), state
+    density = float(np.median([len(s.observations.rays) / s.lattice.size for s in starts]))
+    focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
+    disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
+    prior = curvature_prior(lattice, prior_weight(density), disparity)
+    return make_problem([s.observations for s in starts], [lattice], [prior], plan, law), state
 
 
-def extended(starts: list[FrameStart], optimum: Optimum) -> tuple[Problem, State] | None:
+def _cell(starts: list[FrameStart], placed: list[Registration]) -> float:
+    """Return the lattice spacing, radians, that keeps the detail of the frame that is nearest.
+
+    What a cell of that frame spans is seen under a smaller angle from the first camera.
+    """
+    ratios = [1.0]
+    for start, place in zip(starts, placed, strict=True):
+        near = place.scale * start.points
+        far = place.world_from_camera.apply(near)
+        ratios.append(float(np.median(np.linalg.norm(near, axis=1) / np.linalg.norm(far, axis=1))))
+    return starts[0].lattice.cell * max(min(ratios), FINEST)
+
+
+def extended(optimum: Optimum) -> tuple[Problem, State] | None:
     """Return the problem with a surface grown to where cameras have moved, or None if it fits.
 
     Rays that miss the surface are taken to end at their frame's median range.
@@ -95,7 +117,9 @@ def extended(starts: list[FrameStart], optimum: Optimum) -> tuple[Problem, State
     rho, seen = np.zeros(grown.size), np.zeros(grown.size, bool)
     rho[at], seen[at] = state.rho[0], True
     state = state.with_(rho=[grown.fill(seen, rho)])
-    return _problem(starts, grown, state, old.plan, old.law), state
+    weight, disparity = old.surfaces[0].prior.weight, old.surfaces[0].prior.disparity
+    prior = curvature_prior(grown, weight, disparity)
+    return make_problem(old.frames, [grown], [prior], old.plan, old.law), state
 
 
 MISSED_SHARE = 0.01
@@ -110,20 +134,6 @@ def _missed_points(problem: Problem, optimum: Optimum, frame: int) -> NDArray[np
     _, distance, _, _ = problem.renderers[frame].render(state, frame, 0)
     median = float(np.median(distance[hit])) if hit.any() else 1 / float(np.median(state.rho[0]))
     return state.world_from_camera[frame].apply(median * problem.frames[frame].rays[~hit])
-
-
-def _problem(
-    starts: list[FrameStart],
-    lattice: Lattice,
-    state: State,
-    plan: Plan,
-    law: str,
-) -> Problem:
-    density = float(np.median([len(s.observations.rays) / s.lattice.size for s in starts]))
-    focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
-    disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
-    prior = curvature_prior(lattice, prior_weight(density), disparity)
-    return make_problem([s.observations for s in starts], [lattice], [prior], plan, law)
 
 
 def _projector_poses(
@@ -144,6 +154,19 @@ def _intrinsics(starts: list[FrameStart], plan: Plan) -> list[NDArray[np.float64
         if plan.blocks[name] != "per_frame":
             own[:, place] = np.median(own[:, place], axis=0)
     return list(own)
+
+
+def seen_from_first(placed: list[Registration]) -> list[Registration]:
+    """Return placements whose world is the first frame's camera, in that frame's unit."""
+    first = placed[0]
+    to_first = first.world_from_camera.inverse()
+    moved = [to_first @ p.world_from_camera for p in placed]
+    return [
+        replace(
+            p, world_from_camera=RigidTransform(m.R, m.t / first.scale), scale=p.scale / first.scale
+        )
+        for p, m in zip(placed, moved, strict=True)
+    ]
 
 
 def at_identity(frames: int) -> list[Registration]:

@@ -3,23 +3,26 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..geometry.cameras import CameraModel
 from ..records.calibration import TraceRow
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
-from ..records.solution import LeftOut
+from ..records.solution import LeftOut, Outcome
 from ..start.registration import Registration, register_frames
+from ..start.result import Start
+from .agreement import agreements, worst
 from .drift import drift_prior
 from .fit import Fit
-from .frames import common_start, solve_alone, usable_starts, without_repeats
-from .joint import FrameStart, at_identity, extended, joint_problem
+from .frames import common_start, solve_alone, usable_starts, without_faults, without_repeats
+from .joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
 from .optimum import Optimum
 from .options import Options
 from .plan import make_plan
 from .polish import smooth_surfaces
+from .problem import Problem
 from .resume import resumed_maps, resumed_problem
 from .run import OnIteration, Progress, optimise
 from .single import separate_surfaces
@@ -71,10 +74,7 @@ def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Fit:
     say(0.1, "Optimising")
     with job.timed("optimise"):
         problem, state = resumed_problem(checkpoint, maps, job.camera, plan)
-        optimum = optimise(
-            problem, state, job.options, drift_prior(job.rig, plan), _reporter(job, say, 0.1),
-            checkpoint.stage,
-        )  # fmt: skip
+        optimum = _optimise(job, problem, state, _reporter(job, say, 0.1), checkpoint.stage)
     left_out = [
         LeftOut(name=m.name, reason="it was not part of the calibration resumed")
         for m in job.maps
@@ -86,9 +86,7 @@ def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Fit:
 def _own_surfaces(job: Job, say: Progress) -> Fit:
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        unique, repeated = without_repeats(job.maps)
-        maps, starts, left_out = usable_starts(unique, job.camera, job.rig, job.law, job.options)
-        left_out += repeated
+        maps, starts, left_out = _starts(job)
         plan = make_plan(job.rig, len(maps))
         if len(maps) > 1 and plan.blocks["projector_pose"] != "per_frame":
             starts = common_start(maps, starts, job.camera)
@@ -96,16 +94,14 @@ def _own_surfaces(job: Job, say: Progress) -> Fit:
     notes = list(dict.fromkeys(note for s in starts for note in s.notes))
     with job.timed("optimise"):
         problem, state = separate_surfaces(maps, starts, job.camera, plan, job.law, job.options)
-        optimum = optimise(problem, state, job.options, on_iteration=_reporter(job, say, 0.4))
+        optimum = _optimise(job, problem, state, _reporter(job, say, 0.4))
     return _finish(job, maps, left_out, notes, optimum, say)
 
 
 def _shared_surface(job: Job, say: Progress) -> Fit:
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        unique, repeated = without_repeats(job.maps)
-        maps, starts, left_out = usable_starts(unique, job.camera, job.rig, job.law, job.options)
-        left_out += repeated
+        maps, starts, left_out = _starts(job)
     say(0.3, "Solving every frame alone")
     with job.timed("frames"):
         plan = make_plan(job.rig, len(maps))
@@ -122,8 +118,18 @@ def _shared_surface(job: Job, say: Progress) -> Fit:
     notes = list(dict.fromkeys(note for k in kept for note in starts[k].notes))
     say(0.6, "Optimising all frames")
     with job.timed("optimise"):
-        optimum = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
-    return _finish(job, [maps[k] for k in kept], left_out, notes, optimum, say)
+        together = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
+    left_out += together.left_out
+    maps = [m for m in maps if m.name in together.names]
+    return _finish(job, maps, left_out, notes + together.doubts, together.optimum, say)
+
+
+def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
+    """Start the frames that can be used; name the others."""
+    sound, faulty = without_faults(job.maps, job.rig)
+    unique, repeated = without_repeats(sound)
+    maps, starts, failed = usable_starts(unique, job.camera, job.rig, job.law, job.options)
+    return maps, starts, [*faulty, *repeated, *failed]
 
 
 def _place(job: Job, alone: list[FrameStart]) -> list[Registration]:
@@ -141,20 +147,61 @@ def _named(reason: str, alone: list[FrameStart]) -> str:
     return reason
 
 
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Frames that agree on one surface."""
+
+    names: list[str]
+    optimum: Optimum
+    left_out: list[LeftOut]
+    doubts: list[str]
+
+
 def _optimise_joint(
     job: Job, alone: list[FrameStart], placed: list[Registration], say: Progress
+) -> _Together:
+    """Optimise all frames; leave out one that contradicts the others and try again."""
+    left_out: list[LeftOut] = []
+    while True:
+        plan = make_plan(job.rig, len(alone))
+        problem, state = joint_problem(alone, seen_from_first(placed), plan, job.law)
+        optimum = _optimise(job, problem, state, _reporter(job, say, 0.6))
+        found = agreements(alone, optimum) if len(alone) > 1 else []
+        wrong = None if optimum.outcome is Outcome.INTERRUPTED else worst(found)
+        if wrong is None:
+            break
+        left_out.append(LeftOut(name=alone[wrong].name, reason=found[wrong].reason))
+        alone = [a for k, a in enumerate(alone) if k != wrong]
+        placed = [p for k, p in enumerate(placed) if k != wrong]
+    doubts = [f"do not rely on frame {a.name}: {a.reason}" for a in found if a.doubtful]
+    return _Together([a.name for a in alone], optimum, left_out, doubts)
+
+
+def _optimise(
+    job: Job, problem: Problem, state: State, report: OnIteration, stage: int = 0
 ) -> Optimum:
-    plan = make_plan(job.rig, len(alone))
-    problem, state = joint_problem(alone, placed, plan, job.law)
-    extra = drift_prior(job.rig, plan)
-    report = _reporter(job, say, 0.6)
-    optimum = optimise(problem, state, job.options, extra, report)
+    """Optimise, with a surface that grows to where moving cameras look."""
+    extra = drift_prior(job.rig, problem.plan)
+    optimum = optimise(problem, state, job.options, extra, report, stage)
     for _ in range(_MAX_EXTENSIONS):
-        grown = extended(alone, optimum)
+        if problem.plan.surface != "shared" or optimum.outcome is not Outcome.CONVERGED:
+            break
+        grown = extended(optimum)
         if grown is None:
             break
+        trace = optimum.trace
         optimum = optimise(*grown, job.options, extra, report)
+        optimum = replace(optimum, trace=_continued(trace, optimum.trace))
     return optimum
+
+
+def _continued(before: list[TraceRow], after: list[TraceRow]) -> list[TraceRow]:
+    """Return the trace of an optimisation that went on with another surface."""
+    last = before[-1]
+    return before + [
+        replace(row, iteration=last.iteration + row.iteration, seconds=last.seconds + row.seconds)
+        for row in after
+    ]
 
 
 def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
@@ -181,4 +228,5 @@ def _finish(
         reported = smooth_surfaces(optimum, job.options)
     with job.timed("uncertainty"):
         known = uncertainty(optimum, job.options.jackknife)
-    return Fit(job.law, maps, left_out, optimum, reported, known, notes, job.timings)
+    given = [m.name for m in job.maps]
+    return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings)

@@ -3,6 +3,7 @@
 The optimisation works in units of the first baseline; a similarity afterwards gives millimetres.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,6 +24,8 @@ class Unit:
     kind: Literal["baseline", "known_distance", "up_to_scale"]
     std_relative: float
     """Standard deviation of the factor over the factor."""
+    warning: str = ""
+    """Why the unit that was asked for could not be had."""
 
     @property
     def name(self) -> Literal["mm", "baseline"]:
@@ -33,25 +36,33 @@ class Unit:
         return RigidTransform(pose.R, pose.t * self.factor)
 
 
-def resolve_unit(rig: Rig, camera: CameraModel, ranges: list[NDArray[np.float64]]) -> Unit:
-    """Return the unit that the rig asks for.
+def resolve_unit(
+    rig: Rig, camera: CameraModel, ranges: Sequence[NDArray[np.float64] | None]
+) -> Unit:
+    """Return the unit that the rig asks for, or up to scale if the frame it names was left out.
 
     Args:
         rig: whose ``scale`` decides.
         camera: the camera of the ranges.
-        ranges: for every frame (H, W) along the unit camera rays, baselines, NaN = not seen.
+        ranges: for every frame given (H, W) along the unit camera rays, baselines of the first
+            frame used, NaN = not seen; None for a frame that was left out.
 
     Raises:
         InputError: the known distance lies where nothing was measured.
     """
     scale = rig.scale
     if scale.baseline is not None:
+        if ranges[0] is None and rig.share.projector_pose == "per_frame":
+            return _up_to_scale("scale.baseline is that of the first frame, which was left out")
         return Unit(scale.baseline, "baseline", scale.baseline_std / scale.baseline)
     known = scale.known_distance
     if known is None:
         return Unit(1.0, "up_to_scale", 0.0)
+    image = ranges[known.frame]
+    if image is None:
+        return _up_to_scale("the frame of scale.known_distance was left out")
     pixels = np.array(known.pixels)
-    at = np.array([_bilinear(ranges[known.frame], p) for p in pixels])
+    at = np.array([_bilinear(image, p) for p in pixels])
     if not np.isfinite(at).all():
         raise InputError(
             f"no surface was measured at {known.pixels}", "scale.known_distance.pixels",
@@ -61,6 +72,11 @@ def resolve_unit(rig: Rig, camera: CameraModel, ranges: list[NDArray[np.float64]
     return Unit(
         float(known.mm / np.linalg.norm(ends[0] - ends[1])), "known_distance", known.std / known.mm
     )
+
+
+def _up_to_scale(why: str) -> Unit:
+    lengths = "lengths are multiples of the first baseline used"
+    return Unit(1.0, "up_to_scale", 0.0, f"{why}: {lengths}")
 
 
 def _bilinear(image: NDArray[np.float64], pixel: NDArray[np.float64]) -> float:

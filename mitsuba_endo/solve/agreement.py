@@ -1,0 +1,97 @@
+"""Whether frames that were joined see one surface: a wrong one ruins the others silently.
+
+A frame that is in its right place fits the common surface as well as one of its own. Compared are
+the correspondences that meet the surface where other frames support it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .joint import FrameStart
+from .optimum import Optimum
+from .surface_result import USED_WEIGHT
+
+_SUPPORT = 1.0
+"""Robust weight of other frames around a vertex from which on they support it."""
+_DOUBTFUL, _WRONG = 1.3, 1.8
+"""Residuals on the common surface, relative to those of the frame alone, from which on its place
+is in doubt or wrong. Right frames reach 1.05 on a sheet and 1.2 between the folds of a colon,
+which one surface seen from the first camera cannot show whole."""
+_LEAST_COMMON, _AT_BEST = 0.3, 1.1
+"""A frame of which others see less than this share must fit this well."""
+_MORE_OUTLIERS = 0.35
+"""Rise of the share of outliers that a right place does not cause; folds cause up to 0.2."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well one frame agrees with the others."""
+
+    name: str
+    common: float
+    """Share of its correspondences where other frames see the surface too."""
+    ratio: float
+    """Median residual of those in the joint solution over that of the frame alone."""
+    outliers: float
+    """Share of outliers among those, beyond the frame's own share."""
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the frame must be left out."""
+        weak = self.common < _LEAST_COMMON and self.ratio > _AT_BEST
+        return weak or self.ratio > _WRONG or self.outliers > _MORE_OUTLIERS
+
+    @property
+    def doubtful(self) -> bool:
+        return self.ratio > _DOUBTFUL
+
+    @property
+    def reason(self) -> str:
+        if not self.common:
+            return "no other frame sees the same part of the surface"
+        return (
+            f"it does not fit the surface of the other frames: residuals there are "
+            f"{self.ratio:.2g} times those of the frame alone, {100 * self.common:.0f} % of it is "
+            "seen by others"
+        )
+
+
+def agreements(alone: list[FrameStart], optimum: Optimum) -> list[Agreement]:
+    """Return the agreement of every frame of a joint optimum, in order.
+
+    Args:
+        alone: the frames solved alone.
+        optimum: of all of them with one surface.
+    """
+    own = [_support(optimum, k) for k in range(len(alone))]
+    total = np.sum(own, axis=0)
+    return [_agreement(a, optimum, k, total - own[k]) for k, a in enumerate(alone)]
+
+
+def worst(found: list[Agreement]) -> int | None:
+    """Return the index of the wrong frame with the largest residuals, or None."""
+    wrong = [k for k, a in enumerate(found) if a.wrong]
+    return max(wrong, key=lambda k: (found[k].ratio, found[k].outliers), default=None)
+
+
+def _support(optimum: Optimum, frame: int) -> NDArray[np.float64]:
+    """Return the robust weight (V,) of one frame's observations around every vertex."""
+    size = optimum.objective.problem.surfaces[0].lattice.size
+    triangles = optimum.evaluation.linearisations[frame].triangles
+    total = np.bincount(triangles.ravel(), np.repeat(optimum.weights[frame], 3), size)
+    return total.astype(np.float64)
+
+
+def _agreement(
+    alone: FrameStart, optimum: Optimum, frame: int, others: NDArray[np.float64]
+) -> Agreement:
+    lin = optimum.evaluation.linearisations[frame]
+    common = lin.hit & (others[lin.triangles] >= _SUPPORT).all(1)
+    if not common.any():
+        return Agreement(alone.name, 0.0, np.inf, 0.0)
+    before, after = alone.optimum.evaluation.squared(0), optimum.evaluation.squared(frame)
+    ratio = np.sqrt(np.nanmedian(after[common]) / np.nanmedian(before[common]))
+    lost = (alone.optimum.weights[0] > USED_WEIGHT) & (optimum.weights[frame] <= USED_WEIGHT)
+    return Agreement(alone.name, float(common.mean()), float(ratio), float(lost[common].mean()))
