@@ -43,7 +43,8 @@ class Unknown:
     part: str
     """Its name inside the block, e.g. ``rotation about x``."""
     scale: float
-    """Natural scale: one radian, one baseline, the focal length, one unit of distortion."""
+    """Natural scale: one radian, one baseline for the projector, the surface's median range for a
+    camera, the focal length, one unit of distortion."""
 
     def words(self, plan: Plan) -> str:
         """Return its name for people."""
@@ -73,7 +74,9 @@ def unknowns(plan: Plan, state: State) -> list[Unknown]:
             if width == 5:
                 out += [Unknown(name, frame, f"translation direction {i}", 1.0) for i in (1, 2)]
             else:
-                out += [Unknown(name, frame, f"translation {a}", 1.0) for a in axes]
+                # A camera's own motion is seen against the surface's distance.
+                length = 1.0 if name == "projector_pose" else 1 / float(np.median(state.rho[0]))
+                out += [Unknown(name, frame, f"translation {a}", length) for a in axes]
             continue
         focal = float(np.exp(state.intrinsics[frame][INTRINSICS["focal"]][0]))
         scale = focal if name == "centre" else 1.0
