@@ -227,6 +227,6 @@ def _finish(
     with job.timed("surface"):
         reported = smooth_surfaces(optimum, job.options)
     with job.timed("uncertainty"):
-        known = uncertainty(optimum, job.options.jackknife)
+        known = uncertainty(optimum, reported, job.options.jackknife)
     given = [m.name for m in job.maps]
     return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings)

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .banded import BandedInverse
+from .banded import BandedCholesky, BandedInverse
 from .information import data_information
 from .normal import Reduced, surface_rows
 from .optimum import Optimum
@@ -43,14 +43,22 @@ class Uncertainty:
     """(G, G) information of the data over the noise variance; inverse of ``formal``."""
 
 
-def uncertainty(optimum: Optimum, jackknife: bool) -> Uncertainty:
-    """Compute all covariances at the optimum."""
+def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncertainty:
+    """Compute all covariances.
+
+    Args:
+        optimum: the calibration.
+        reported: the same with the surface smoothed as it is reported; the data's information is
+            taken there, where less noise passes for relief.
+        jackknife: whether to compute the block jackknife too.
+    """
     problem, loss = optimum.objective.problem, optimum.objective.loss
     reduced = optimum.normal.reduce()
     inverses = [factor.inverse() for factor in reduced.factors]
     fitted = _fitted_unknowns(problem, optimum, reduced, inverses)
     variance, shrinkage = _noise(problem, optimum, loss, fitted)
-    information = data_information(optimum, reduced, variance)
+    smooth = reported.normal.reduce()
+    information = data_information(reported, smooth, variance)
     S_inverse = _inverse(information)
     formal = shrinkage * variance * S_inverse
     blocks = _block_contributions(problem, optimum, reduced) if jackknife else None
@@ -60,8 +68,8 @@ def uncertainty(optimum: Optimum, jackknife: bool) -> Uncertainty:
         jackknife=None if blocks is None else _jackknife(reduced, *blocks[:2]),
         frame_jackknife=None if blocks is None else _by_frame(reduced, *blocks),
         rho_std=[
-            np.sqrt(shrinkage * variance * _surface_variance(inverse, x[:, :-1], S_inverse))
-            for inverse, x in zip(inverses, reduced.eliminated, strict=True)
+            np.sqrt(shrinkage * variance * _surface_variance(factor, x[:, :-1], S_inverse))
+            for factor, x in zip(smooth.factors, smooth.eliminated, strict=True)
         ],
         information=information / (shrinkage * variance),
     )
@@ -105,11 +113,11 @@ def _fitted_unknowns(
 
 
 def _surface_variance(
-    inverse: BandedInverse, coupling: NDArray[np.float64], S_inverse: NDArray[np.float64]
+    factor: BandedCholesky, coupling: NDArray[np.float64], S_inverse: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Diagonal of the surface's block of H^-1: A^-1 + X S^-1 X^T with X = A^-1 B."""
     n = np.arange(len(coupling))
-    return inverse.entries(n, n) + np.einsum("vi,vi->v", coupling @ S_inverse, coupling)
+    return factor.inverse().entries(n, n) + np.einsum("vi,vi->v", coupling @ S_inverse, coupling)
 
 
 def _inverse(S: NDArray[np.float64]) -> NDArray[np.float64]:
