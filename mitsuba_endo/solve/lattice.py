@@ -20,6 +20,17 @@ rays, and a ray along an edge can slip between two triangles."""
 
 
 @dataclass(frozen=True, eq=False)
+class FacePattern:
+    """Sparse (V, V) matrix that couples the vertices of every face."""
+
+    indices: NDArray[np.int32]
+    """Columns, as in ``csr_array``."""
+    indptr: NDArray[np.int32]
+    positions: NDArray[np.int64]
+    """(F, 3, 3) place in the matrix's data of each pair of a face's vertices."""
+
+
+@dataclass(frozen=True, eq=False)
 class Lattice:
     """A triangulated set of directions; X_i = directions_i / rho_i."""
 
@@ -55,6 +66,17 @@ class Lattice:
         triples = self.second_differences().indices.reshape(-1, 3)
         faces = np.ptp(self.faces, axis=1).max(initial=1)
         return int(max(np.ptp(triples, axis=1).max(initial=1), faces))
+
+    @cached_property
+    def face_pattern(self) -> FacePattern:
+        """Which entries of a normal matrix the observations fill."""
+        rows = np.broadcast_to(self.faces[:, :, None], (len(self.faces), 3, 3))
+        columns = np.broadcast_to(self.faces[:, None, :], rows.shape)
+        key, positions = np.unique(rows * self.size + columns, return_inverse=True)
+        row, column = np.divmod(key, self.size)
+        counts = np.bincount(row, minlength=self.size)
+        indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        return FacePattern(column.astype(np.int32), indptr, positions.reshape(rows.shape))
 
     def second_differences(self) -> sp.csr_array:
         """Return the (M, V) operator rho_before - 2 rho + rho_after along both lattice axes."""

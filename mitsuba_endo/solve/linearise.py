@@ -7,6 +7,7 @@ u and one for v give every pixel's row of the Jacobian. No derivative is written
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -46,12 +47,19 @@ class Linearisation:
     """(2, N) rendered coordinates, pattern pixels."""
     hit: NDArray[np.bool_]
     """(N,) pixels whose ray meets the surface in front of the projector."""
-    triangles: NDArray[np.int64]
-    """(N, 3) vertices that the pixel's hit point depends on."""
+    lattice: Lattice
+    """The surface."""
+    faces: NDArray[np.int64]
+    """(N,) triangle that the pixel sees, any where none is hit."""
     J_surface: NDArray[np.float64]
     """(2, 3, N) derivatives with respect to the inverse ranges of these vertices."""
     J_local: NDArray[np.float64]
     """(2, L, N) derivatives with respect to the frame's active blocks, in the plan's order."""
+
+    @cached_property
+    def triangles(self) -> NDArray[np.int64]:
+        """(N, 3) vertices that the pixel's hit point depends on."""
+        return self.lattice.faces[self.faces]
 
 
 @dataclass(eq=False)
@@ -74,9 +82,9 @@ class FrameRenderer:
         self, state: State, frame: int, surface: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
         """Return (2, N) coordinates, (N,) ranges, (N, 3) vertices of the triangles, (N,) hits."""
-        u, v, hit, triangle, distance = self._trace(state, frame, surface, [], {})
-        dr.eval(u, v, hit, triangle, distance)
-        vertices = np.stack([t.numpy() for t in triangle], 1).astype(np.int64)
+        u, v, hit, face, distance = self._trace(state, frame, surface, [], {})
+        dr.eval(u, v, hit, face, distance)
+        vertices = self.scene.lattice.faces[face.numpy()]
         return np.stack([u.numpy(), v.numpy()]), distance.numpy(), vertices, hit.numpy()
 
     def linearise(
@@ -87,18 +95,19 @@ class FrameRenderer:
         for component in (0, 1):
             # Tracing twice costs Python time only: Dr.Jit merges the equal parts in one kernel.
             lanes, widths = self._lanes(active, terms)
-            u, v, hit, triangle, _ = self._trace(
+            u, v, hit, face, _ = self._trace(
                 state, frame, surface, lanes[:3], _split(lanes[3:], widths)
             )
             dr.backward(dr.select(hit, (u, v)[component], 0.0))
             columns.append([dr.grad(lane) for lane in lanes])
         u, v = dr.detach(u), dr.detach(v)
-        dr.eval(u, v, hit, triangle, columns)
+        dr.eval(u, v, hit, face, columns)
         J = np.array([[c.numpy() for c in row] for row in columns])
         return Linearisation(
             np.stack([u.numpy(), v.numpy()]),
             hit.numpy(),
-            np.stack([t.numpy() for t in triangle], 1).astype(np.int64),
+            self.scene.lattice,
+            face.numpy().astype(np.int64),
             J[:, :3],
             J[:, 3:],
         )
@@ -128,17 +137,19 @@ class FrameRenderer:
             (V,) with respect to the inverse ranges and (L,) to the active blocks.
         """
         lanes, widths = self._lanes(active, terms)
-        u, v, hit, triangle, _ = self._trace(
+        u, v, hit, face, _ = self._trace(
             state, frame, surface, lanes[:3], _split(lanes[3:], widths)
         )
         du, dv = u - mi.Float64(q[0]), v - mi.Float64(q[1])
         dr.backward(dr.select(hit, loss(du * du + dv * dv), 0.0))
         columns = [dr.grad(lane) for lane in lanes]
-        dr.eval(columns, triangle)
+        dr.eval(columns, face)
         # Summed afterwards: ten times faster than adding all pixels to one number in the kernel.
         d_rho = np.zeros(self.scene.lattice.size)
-        for vertex, column in zip(triangle, columns[:3], strict=True):
-            d_rho += np.bincount(vertex.numpy(), column.numpy(), len(d_rho))
+        faces, seen = self.scene.lattice.faces, face.numpy()
+        for i, column in enumerate(columns[:3]):
+            of_face = np.bincount(seen, column.numpy(), len(faces))
+            d_rho += np.bincount(faces[:, i], of_face, len(d_rho))
         return d_rho, np.array([column.numpy().sum() for column in columns[3:]])
 
     def _lanes(self, active: Sequence[str], terms: int) -> tuple[list[Any], dict[str, int]]:
@@ -150,8 +161,8 @@ class FrameRenderer:
 
     def _trace(
         self, state: State, frame: int, surface: int, d_rho: list[Any], d: dict[str, list[Any]]
-    ) -> tuple[Any, Any, Any, list[Any], Any]:
-        """Trace u, v, the hit mask, the vertices of the triangle seen and the range.
+    ) -> tuple[Any, Any, Any, Any, Any]:
+        """Trace u, v, the hit mask, the triangle seen and the range.
 
         ``d_rho`` and ``d`` hold offsets per pixel, zero in value, of the triangle's three inverse
         ranges and of the blocks; their derivatives are those with respect to the parameters.
@@ -174,7 +185,7 @@ class FrameRenderer:
         normal = dr.cross(corners[1] - corners[0], corners[2] - corners[0])
         distance = dr.dot(normal, corners[0] - origin) / dr.dot(normal, w)
         u, v, front = self._project(state, frame, distance, d)
-        return u, v, hit & front, triangle, distance
+        return u, v, hit & front, prim, distance
 
     def _seen(self, origin: Any, w: Any) -> tuple[Any, Any]:
         if not self.at_centre:
