@@ -9,6 +9,7 @@ from .calibrate import calibrate
 from .demo import demo
 from .doctor import doctor
 from .evaluate import evaluate
+from .export import export
 from .render import render
 
 app = typer.Typer(
@@ -17,7 +18,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, doctor, render, calibrate, evaluate):
+for command in (demo, doctor, render, calibrate, evaluate, export):
     app.command()(command)
 
 

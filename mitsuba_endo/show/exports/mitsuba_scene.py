@@ -1,0 +1,32 @@
+"""The calibrated scene for Mitsuba."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import InputError
+from ...files import atomic_folder
+from ...records.solution import Solution
+from ...records.surface import load_surface, save_surface
+from ..scene_file import save_scene
+from .known import known_camera, known_projector, known_size, projector_pose
+from .registry import register_exporter
+
+
+@register_exporter("mitsuba", "folder with scene.xml and surface.ply")
+def write_mitsuba(solution: Solution, folder: Path, path: Path) -> None:
+    """Write the scene of the first frame with the surface beside it.
+
+    Raises:
+        InputError: a value was not determined, or the folder cannot be written.
+    """
+    if solution.surface is None:
+        raise InputError("surface is missing", "solution.json", "calibrate again")
+    first = solution.frames[0]
+    camera, pose = known_camera(solution), projector_pose(first)
+    projector, size = known_projector(solution, first), known_size(solution)
+    surface = load_surface(folder / solution.surface)
+    distance = float(np.median(np.linalg.norm(surface.vertices, axis=-1)))
+    with atomic_folder(path) as aside:
+        save_surface(aside / "surface.ply", surface)
+        save_scene(aside / "scene.xml", camera, projector, size, pose, "surface.ply", distance)

@@ -1,0 +1,103 @@
+"""OpenCV FileStorage, as ``cv2.stereoCalibrate``'s samples write it."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...files import atomic_path
+from ...geometry.arrays import Array
+from ...geometry.laws import ProjectorModel
+from ...geometry.transforms import RigidTransform
+from ...records.solution import Frame, Solution
+from .known import camera_pose, known_camera, known_projector, known_size, projector_pose
+from .registry import register_exporter
+
+_SUFFIXES = (".yaml", ".yml", ".xml", ".json")
+
+
+@register_exporter("opencv", "FileStorage file: matrices, distortion, R, T")
+def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
+    """Write camera, projector and poses for ``cv2.FileStorage``.
+
+    ======================================  =======================================================
+    camera_matrix, distortion_coefficients  of the camera, with image_width, image_height and
+                                            fisheye_model; a rig file can name this file as camera
+    projector_matrix                        [[f, 0, cx], [0, f aspect, cy], [0, 0, 1]] of the first
+                                            frame, pattern pixels, with projector_width and _height
+    projector_law                           to what the matrix is applied: ``pinhole``, (x/z, y/z)
+                                            as OpenCV does; ``direction_cosine``, (x, y)/|X|
+    projector_distortion_coefficients       k1, k2, p1, p2, k3 on those coordinates
+    R, T                                    of the first frame, X_projector = R X_camera + T
+    frames                                  of every frame: name, R, T, projector_matrix, and
+                                            world_R, world_T with X_world = world_R X_camera +
+                                            world_T
+    units                                   of T: ``mm`` or ``baseline``
+    ======================================  =======================================================
+
+    Raises:
+        InputError: a value was not determined, the suffix is not one of FileStorage's, or the
+            file cannot be written.
+    """
+    if path.suffix.lower() not in _SUFFIXES:
+        raise InputError(
+            f"unknown kind of file '{path.suffix}'", str(path), f"end it in {', '.join(_SUFFIXES)}"
+        )
+    camera, size = known_camera(solution), known_size(solution)
+    poses = [(projector_pose(f), camera_pose(f)) for f in solution.frames]
+    projectors = [known_projector(solution, f) for f in solution.frames]
+    fisheye = camera.model == "opencv_fisheye"
+    with atomic_path(path) as aside:
+        storage = cv2.FileStorage(str(aside), cv2.FILE_STORAGE_WRITE)
+        if not storage.isOpened():
+            raise InputError("cannot be written", str(path), "choose a folder you may write to")
+        storage.write("units", solution.units)
+        storage.write("image_width", camera.width)
+        storage.write("image_height", camera.height)
+        storage.write("fisheye_model", int(fisheye))
+        storage.write("camera_matrix", np.asarray(camera.K, np.float64))
+        storage.write("distortion_coefficients", _row(camera.distortion, 4 if fisheye else 5))
+        storage.write("projector_law", projectors[0].law)
+        storage.write("projector_width", size[0])
+        storage.write("projector_height", size[1])
+        storage.write("projector_matrix", projector_matrix(projectors[0]))
+        distortion = _row(projectors[0].distortion.coefficients, 5)
+        storage.write("projector_distortion_coefficients", distortion)
+        storage.write("R", poses[0][0].R)
+        storage.write("T", poses[0][0].t.reshape(3, 1))
+        _write_frames(storage, solution.frames, projectors, poses)
+        storage.release()
+
+
+def _write_frames(
+    storage: cv2.FileStorage,
+    frames: list[Frame],
+    projectors: list[ProjectorModel],
+    poses: list[tuple[RigidTransform, RigidTransform]],
+) -> None:
+    storage.startWriteStruct("frames", cv2.FileNode_SEQ)
+    for frame, projector, (pose, world) in zip(frames, projectors, poses, strict=True):
+        storage.startWriteStruct("", cv2.FileNode_MAP)
+        storage.write("name", frame.name)
+        storage.write("R", pose.R)
+        storage.write("T", pose.t.reshape(3, 1))
+        storage.write("projector_matrix", projector_matrix(projector))
+        storage.write("world_R", world.R)
+        storage.write("world_T", world.t.reshape(3, 1))
+        storage.endWriteStruct()
+    storage.endWriteStruct()
+
+
+def projector_matrix(projector: ProjectorModel) -> NDArray[np.float64]:
+    """Return the (3, 3) matrix from normalised to pattern coordinates, pattern pixels."""
+    f, (cx, cy) = projector.focal, projector.centre
+    return np.array([[f, 0, cx], [0, f * projector.aspect, cy], [0, 0, 1]], np.float64)
+
+
+def _row(coefficients: Sequence[Array], at_least: int) -> NDArray[np.float64]:
+    """Pad with zeros to the length that OpenCV's functions accept."""
+    values = [float(c) for c in coefficients]
+    return np.array([values + [0.0] * (at_least - len(values))], np.float64)

@@ -1,0 +1,169 @@
+"""Exports, each read back by the program it is for."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mitsuba_endo import backend
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.records.calibration import Calibration
+from mitsuba_endo.records.rig import load_rig
+from mitsuba_endo.records.solution import Estimate, Solution, load_solution, save_solution
+from mitsuba_endo.records.surface import load_surface, save_surface
+from mitsuba_endo.show.exports import EXPORTERS, export
+
+POINTS = np.array([[3.0, -5.0, 62.0], [-14.0, 8.0, 75.0], [9.0, 11.0, 58.0]])
+"""In the first camera's frame."""
+
+
+def _write(folder: Path, calibration: Calibration, solution: Solution) -> Path:
+    folder.mkdir()
+    save_solution(folder / "solution.json", solution.model_copy(update={"surface": "surface.ply"}))
+    save_surface(folder / "surface.ply", calibration.surface)
+    return folder
+
+
+def _with_projector(solution: Solution, **changes: object) -> Solution:
+    projector = solution.projector.model_copy(update=changes)
+    return solution.model_copy(update={"projector": projector})
+
+
+@pytest.fixture(scope="module")
+def calibration(make_calibration: Callable[..., Calibration]) -> Calibration:
+    return make_calibration(width=64, height=46, count=2)
+
+
+@pytest.fixture
+def result(tmp_path: Path, calibration: Calibration) -> Path:
+    """Two frames, law direction_cosine."""
+    return _write(tmp_path / "result", calibration, calibration.solution)
+
+
+@pytest.fixture
+def pinhole(tmp_path: Path, calibration: Calibration) -> Path:
+    """The same with a pinhole projector."""
+    solution = _with_projector(calibration.solution, law="pinhole")
+    return _write(tmp_path / "pinhole", calibration, solution)
+
+
+def _expected(folder: Path, frame: int) -> np.ndarray:
+    """Project POINTS, moved to a frame's camera, with this package's own geometry."""
+    solution = load_solution(folder)
+    first = solution.frames[0].world_from_camera.to_transform()
+    world = solution.frames[frame].world_from_camera.to_transform()
+    pose = solution.frames[frame].projector_from_camera.to_transform()
+    model = solution.projector.to_model()
+    assert first is not None
+    assert world is not None
+    assert pose is not None
+    assert model is not None
+    return model.project(pose.apply(world.inverse().apply(first.apply(POINTS))))
+
+
+def test_opencv_projects_as_the_solution(pinhole: Path, tmp_path: Path):
+    """Oracle: cv2.projectPoints with the matrices that cv2 reads back."""
+    export(pinhole, "opencv", tmp_path / "out.yaml")
+    storage = cv2.FileStorage(str(tmp_path / "out.yaml"), cv2.FILE_STORAGE_READ)
+    K, d, R, T = (
+        storage.getNode(n).mat()
+        for n in ("projector_matrix", "projector_distortion_coefficients", "R", "T")
+    )
+    q, _ = cv2.projectPoints(POINTS, cv2.Rodrigues(R)[0], T, K, d)
+    np.testing.assert_allclose(q[:, 0], _expected(pinhole, 0), atol=1e-9)
+    frames = storage.getNode("frames")
+    second = frames.at(1)
+    assert frames.size() == 2
+    assert second.getNode("name").string() == "run/frame_1.exr"
+    world_R, world_T = second.getNode("world_R").mat(), second.getNode("world_T").mat()
+    in_camera = (POINTS - world_T.T) @ world_R  # the first camera is the world here
+    R, T = second.getNode("R").mat(), second.getNode("T").mat()
+    K = second.getNode("projector_matrix").mat()
+    q, _ = cv2.projectPoints(in_camera, cv2.Rodrigues(R)[0], T, K, d)
+    np.testing.assert_allclose(q[:, 0], _expected(pinhole, 1), atol=1e-9)
+    assert storage.getNode("projector_law").string() == "pinhole"
+    storage.release()
+
+
+def test_rig_file_takes_the_camera_from_it(result: Path, tmp_path: Path, calibration: Calibration):
+    """Oracle: the solution's camera, after the way through OpenCV's file and a rig file."""
+    export(result, "opencv", tmp_path / "camera.yaml")
+    (tmp_path / "rig.yaml").write_text(
+        "camera: camera.yaml\nprojector: {width: 1024, height: 768}\n", encoding="utf-8"
+    )
+    camera = load_rig(tmp_path / "rig.yaml").camera.to_model()
+    np.testing.assert_allclose(camera.K, calibration.camera.K, rtol=1e-15)
+    assert (camera.width, camera.height) == (64, 46)
+    np.testing.assert_allclose(camera.distortion, [*calibration.camera.distortion, 0], rtol=1e-15)
+
+
+def test_colmap_projects_as_the_solution(pinhole: Path, tmp_path: Path, calibration: Calibration):
+    """Oracle: pycolmap's own projection, whose first pixel centre is (0.5, 0.5)."""
+    pycolmap = pytest.importorskip("pycolmap")
+    export(pinhole, "colmap", tmp_path / "model")
+    model = pycolmap.Reconstruction(str(tmp_path / "model"))
+    named = {image.name: image for image in model.images.values()}
+    assert set(named) == {
+        "run/frame_0.exr", "run/frame_1.exr",
+        "projector/run/frame_0.exr", "projector/run/frame_1.exr",
+    }  # fmt: skip
+    for frame in (0, 1):
+        image = named[f"projector/run/frame_{frame}.exr"]
+        q = np.array([image.project_point(p) for p in POINTS]) - 0.5
+        np.testing.assert_allclose(q, _expected(pinhole, frame), atol=1e-6)
+    pixels = np.array([named["run/frame_0.exr"].project_point(p) for p in POINTS]) - 0.5
+    np.testing.assert_allclose(pixels, calibration.camera.project(POINTS), atol=1e-6)
+    assert len(model.points3D) == len(calibration.surface.vertices)
+    found = np.array([model.points3D[i + 1].xyz for i in range(5)])
+    np.testing.assert_allclose(found, calibration.surface.vertices[:5], atol=1e-4)  # float32 PLY
+
+
+def test_colmap_refuses_what_it_cannot_express(result: Path, tmp_path: Path):
+    """Oracle: COLMAP's list of camera models holds no direction cosines."""
+    with pytest.raises(InputError, match=r"COLMAP has no camera like the law direction_cosine"):
+        export(result, "colmap", tmp_path / "model")
+    assert not (tmp_path / "model").exists()
+
+
+def test_ply_keeps_the_std(result: Path, tmp_path: Path, calibration: Calibration):
+    """Oracle: the calibration's surface, to the float32 of the file."""
+    export(result, "ply", tmp_path / "out.ply")
+    surface = load_surface(tmp_path / "out.ply")
+    assert surface.std is not None
+    assert calibration.surface.std is not None
+    np.testing.assert_allclose(surface.vertices, calibration.surface.vertices, atol=1e-5)
+    np.testing.assert_allclose(surface.std, calibration.surface.std, rtol=1e-6)
+
+
+def test_mitsuba_loads_the_scene(result: Path, tmp_path: Path, calibration: Calibration):
+    """Oracle: Mitsuba's parser; the scene has the film's size and the surface's vertices."""
+    backend.use("llvm_ad_rgb")
+    import mitsuba as mi
+
+    export(result, "mitsuba", tmp_path / "scene")
+    scene = mi.load_file(str(tmp_path / "scene" / "scene.xml"))
+    assert tuple(scene.sensors()[0].film().size()) == (64, 46)
+    assert scene.shapes()[0].vertex_count() == len(calibration.surface.vertices)
+
+
+@pytest.mark.parametrize("name", ["opencv", "colmap", "mitsuba"])
+def test_unknown_value_is_named(name: str, tmp_path: Path, calibration: Calibration):
+    """Oracle: the field that is null, and its reason, in the message; nothing is written."""
+    unknown = Estimate(value=None, status="unobservable", reason="the surface is one plane")
+    solution = _with_projector(calibration.solution, law="pinhole", focal=unknown)
+    folder = _write(tmp_path / "result", calibration, solution)
+    out = tmp_path / "out.yaml"
+    with pytest.raises(InputError, match=r"projector\.focal was not determined .*one plane"):
+        export(folder, name, out)
+    assert not out.exists()
+
+
+def test_other_names_and_suffixes(result: Path, tmp_path: Path):
+    """Oracle: the registry, and FileStorage's suffixes."""
+    assert set(EXPORTERS) == {"opencv", "colmap", "ply", "mitsuba"}
+    with pytest.raises(InputError, match=r"unknown format 'stl'"):
+        export(result, "stl", tmp_path / "out.stl")
+    with pytest.raises(InputError, match=r"unknown kind of file '\.txt'"):
+        export(result, "opencv", tmp_path / "out.txt")
