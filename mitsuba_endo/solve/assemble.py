@@ -191,7 +191,8 @@ def _intrinsic(report: Report, block: str, frame: int) -> Estimate:
 def _values(report: Report, block: str, frame: int) -> NDArray[np.float64]:
     vector = report.fit.state.intrinsics[frame][INTRINSICS[block]]
     if block in ("focal", "aspect"):
-        return np.exp(vector)
+        # Twelve digits: a given value comes back as given in spite of its logarithm.
+        return np.array([float(f"{v:.12g}") for v in np.exp(vector)])
     if block == "distortion":
         used = int(np.max(np.nonzero(vector)[0], initial=-1)) + 1
         return vector[: max(used, report.plan.distortion_terms)]
