@@ -34,11 +34,12 @@ from .observability import (
 )
 from .options import Options
 from .plan import Plan
-from .redundancy import redundancy_warnings
+from .redundancy import Look, redundancy_warnings
 from .resume import checkpoint_of
 from .scale import Unit, resolve_unit
+from .slips import count_slips
 from .state import INTRINSICS
-from .surface_result import USED_WEIGHT, frame_maps, render_frames, surface_estimate
+from .surface_result import USED_WEIGHT, Rendering, frame_maps, render_frames, surface_estimate
 from .verdict import verdict
 
 
@@ -94,6 +95,11 @@ def assemble(
         surface_estimate(fit, i, unit.factor, _inflation(fit))
         for i in range(fit.problem.plan.surfaces)
     ]
+    period = rig.projector.grid_period
+    slips = [
+        None if period is None else count_slips(m.q, r.q, period)
+        for m, r in zip(fit.maps, renderings, strict=True)
+    ]
     solution = Solution(
         outcome=fit.optimum.outcome,
         units=unit.name,
@@ -101,7 +107,7 @@ def assemble(
         scale_std_percent=100 * unit.std_relative,
         camera=Camera.from_model(camera),
         projector=_projector(report, rig),
-        frames=[_frame(report, k) for k in range(len(fit.maps))],
+        frames=[_frame(report, k, slips[k]) for k in range(len(fit.maps))],
         left_out=fit.left_out,
         surface="surface.ply",
         noise_px=fit.uncertainty.sigma,
@@ -110,7 +116,12 @@ def assemble(
         timings=fit.timings,
         versions=versions(),
         configuration={"options": asdict(options), "rig": rig.model_dump(mode="json")},
-        warnings=[*fit.notes, *(warnings or []), *_warnings(report)],
+        warnings=[
+            *fit.notes,
+            *(warnings or []),
+            *_warnings(report),
+            *redundancy_warnings(_looks(fit, camera, renderings), camera, fit.uncertainty.sigma),
+        ],  # fmt: skip
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(
@@ -218,7 +229,7 @@ def _worst(report: Report, columns: range) -> Status:
     return status_of(max(float(deviations[i]) / report.names[i].scale for i in columns))
 
 
-def _frame(report: Report, k: int) -> Frame:
+def _frame(report: Report, k: int, slips: int | None) -> Frame:
     fit = report.fit
     state = fit.state
     weight = fit.reported.weights[k]
@@ -235,6 +246,7 @@ def _frame(report: Report, k: int) -> Frame:
         median_px=float(np.sqrt(np.nanmedian(r2))) if np.isfinite(r2).any() else None,
         used=int(used.sum()),
         outliers=1 - float(used.sum()) / max(valid, 1),
+        slips=slips,
     )
 
 
@@ -297,7 +309,17 @@ def _warnings(report: Report) -> list[str]:
             "frames that share neither surface nor projector pose each have a scale of their own: "
             "every baseline is taken to be as long as the first"
         )
-    return out + redundancy_warnings(fit.maps, fit.uncertainty.sigma)
+    return out
+
+
+def _looks(fit: Fit, camera: CameraModel, renderings: list[Rendering]) -> list[Look]:
+    """Return what the frames see, baselines."""
+    rays = camera.rays(camera.pixel_grid())
+    return [
+        Look(m, r.range[..., None] * rays, fit.state.world_from_camera[k],
+             fit.problem.plan.surface_of(k))
+        for k, (m, r) in enumerate(zip(fit.maps, renderings, strict=True))
+    ]  # fmt: skip
 
 
 def _listed(items: list[str]) -> str:
