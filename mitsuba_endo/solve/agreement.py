@@ -19,8 +19,9 @@ _DOUBTFUL, _WRONG = 1.3, 1.8
 """Residuals on the common surface, relative to those of the frame alone, from which on its place
 is in doubt or wrong. Right frames reach 1.05 on a sheet and 1.2 between the folds of a colon,
 which one surface seen from the first camera cannot show whole."""
-_LEAST_COMMON, _AT_BEST = 0.3, 1.1
-"""A frame of which others see less than this share must fit this well."""
+_LEAST_COMMON = 0.25
+"""Share of a frame that others must see: over a small part, wrong places fit as well as the right
+one (found at 0.15 to 0.2 in frames that have nothing in common)."""
 _MORE_OUTLIERS = 0.35
 """Rise of the share of outliers that a right place does not cause; folds cause up to 0.2."""
 
@@ -40,8 +41,12 @@ class Agreement:
     @property
     def wrong(self) -> bool:
         """Whether the frame must be left out."""
-        weak = self.common < _LEAST_COMMON and self.ratio > _AT_BEST
-        return weak or self.ratio > _WRONG or self.outliers > _MORE_OUTLIERS
+        return self.stray or self.ratio > _WRONG or self.outliers > _MORE_OUTLIERS
+
+    @property
+    def stray(self) -> bool:
+        """Whether too little ties the frame to the others."""
+        return self.common < _LEAST_COMMON
 
     @property
     def doubtful(self) -> bool:
@@ -49,8 +54,11 @@ class Agreement:
 
     @property
     def reason(self) -> str:
-        if not self.common:
-            return "no other frame sees the same part of the surface"
+        if self.stray:
+            return (
+                f"other frames see only {100 * self.common:.0f} % of it, too little to be sure of "
+                "its place"
+            )
         return (
             f"it does not fit the surface of the other frames: residuals there are "
             f"{self.ratio:.2g} times those of the frame alone, {100 * self.common:.0f} % of it is "
@@ -71,9 +79,9 @@ def agreements(alone: list[FrameStart], optimum: Optimum) -> list[Agreement]:
 
 
 def worst(found: list[Agreement]) -> int | None:
-    """Return the index of the wrong frame with the largest residuals, or None."""
+    """Return the index of the most clearly wrong frame, or None."""
     wrong = [k for k, a in enumerate(found) if a.wrong]
-    return max(wrong, key=lambda k: (found[k].ratio, found[k].outliers), default=None)
+    return max(wrong, key=lambda k: (found[k].stray, found[k].ratio), default=None)
 
 
 def _support(optimum: Optimum, frame: int) -> NDArray[np.float64]:

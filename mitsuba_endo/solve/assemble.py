@@ -121,7 +121,7 @@ def assemble(
             *(warnings or []),
             *_warnings(report),
             *redundancy_warnings(_looks(fit, camera, renderings), camera, fit.uncertainty.sigma),
-        ],  # fmt: skip
+        ],
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(

@@ -1,0 +1,170 @@
+"""Stopping and going on. Oracle: the optimum of the same calibration in one go."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.records.calibration import Calibration
+from mitsuba_endo.records.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from mitsuba_endo.records.rig import Rig
+from mitsuba_endo.records.solution import Outcome, load_solution
+from mitsuba_endo.solve.calibrate import calibrate
+from mitsuba_endo.solve.options import Options
+from tests.cli.inputs import run
+from tests.solve.views import POSE, Views, look, projector_poses, relief_surface, steps
+
+pytestmark = pytest.mark.usefixtures("llvm")
+
+QUICK = Options(jackknife=False)
+SHARES = {
+    "one surface": {},
+    "surfaces per frame": {"surface": "per_frame", "projector_pose": "shared"},
+}
+
+
+@pytest.fixture(scope="module", params=SHARES)
+def case(request: pytest.FixtureRequest) -> tuple[Views, Rig, Calibration]:
+    """Views, a rig, and the calibration in one go."""
+    own = request.param == "one surface"
+    views = look(relief_surface(), steps(2), projector_poses(2) if own else [POSE] * 2)
+    rig = views.rig(share=SHARES[request.param])
+    return views, rig, calibrate(views.maps, rig, QUICK)
+
+
+def stop_at(iteration: int) -> Callable[[float, str], None]:
+    """Return a progress callback that acts as Ctrl-C in an iteration of the last stage."""
+
+    def progress(_share: float, step: str) -> None:
+        if f"iteration {iteration}," in step:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def checkpoint_of(result: Calibration) -> Checkpoint:
+    assert result.checkpoint is not None
+    return result.checkpoint
+
+
+def assert_same_optimum(found: Calibration, oracle: Calibration) -> None:
+    """Both stopped where a step is 0.1 standard deviations over all unknowns: single ones more."""
+    a, b = found.solution, oracle.solution
+    assert a.outcome is Outcome.CONVERGED
+    assert [f.name for f in a.frames] == [f.name for f in b.frames]
+    std = b.projector.focal.std
+    assert isinstance(std, float)
+    assert a.projector.focal.value == pytest.approx(b.projector.focal.value, abs=0.5 * std)
+    for mine, other in zip(a.frames, b.frames, strict=True):
+        for one, two in (
+            (mine.projector_from_camera, other.projector_from_camera),
+            (mine.world_from_camera, other.world_from_camera),
+        ):
+            assert one.t is not None
+            assert two.t is not None
+            assert two.std is not None
+            assert (np.abs(np.subtract(one.t, two.t)) <= 0.5 * np.array(two.std[3:]) + 1e-9).all()
+
+
+def test_after_the_limit_of_iterations(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    stopped = calibrate(views.maps, rig, replace(QUICK, max_iterations=1))
+    assert stopped.solution.outcome is Outcome.MAX_ITERATIONS
+    assert any("had not converged" in w for w in stopped.solution.warnings)
+    assert len(stopped.trace) == 1
+    assert_same_optimum(calibrate(views.maps, rig, QUICK, resume=checkpoint_of(stopped)), oracle)
+
+
+def test_after_an_interrupt(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    stopped = calibrate(views.maps, rig, QUICK, stop_at(1))
+    assert stopped.solution.outcome is Outcome.INTERRUPTED
+    assert_same_optimum(calibrate(views.maps, rig, QUICK, resume=checkpoint_of(stopped)), oracle)
+
+
+def test_an_optimum_stays_where_it_is(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    again = calibrate(views.maps, rig, QUICK, resume=checkpoint_of(oracle))
+    assert_same_optimum(again, oracle)
+    assert len(again.trace) <= 2
+
+
+def test_interrupt_before_there_is_anything_to_keep(
+    case: tuple[Views, Rig, Calibration],
+) -> None:
+    views, rig, _ = case
+
+    def progress(_share: float, step: str) -> None:
+        if step == "Searching for a start":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        calibrate(views.maps, rig, QUICK, progress)
+
+
+def test_through_a_file(case: tuple[Views, Rig, Calibration], tmp_path: Path) -> None:
+    """Oracle: the checkpoint in memory, field by field."""
+    before = checkpoint_of(case[2])
+    save_checkpoint(tmp_path / "state.npz", before)
+    after = load_checkpoint(tmp_path)
+    assert (after.law, after.stage, after.names) == (before.law, before.stage, before.names)
+    for name in ("used", "lattices", "faces", "rho", "intrinsics", "cells", "weights"):
+        for a, b in zip(getattr(after, name), getattr(before, name), strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=name)
+    for name in ("world_from_camera", "projector_from_camera"):
+        for a, b in zip(getattr(after, name), getattr(before, name), strict=True):
+            np.testing.assert_array_equal(a.matrix(), b.matrix(), err_msg=name)
+
+
+def test_law_that_was_being_fitted_is_kept() -> None:
+    """Interrupted in the first of both laws: that one is returned and gone on with."""
+    views = look(relief_surface(), steps(1), [POSE])
+    rig = views.rig(projector={**views.rig().projector.model_dump(), "law": "auto"})
+    stopped = calibrate(views.maps, rig, QUICK, stop_at(1))
+    assert stopped.solution.outcome is Outcome.INTERRUPTED
+    resumed = calibrate(views.maps, rig, QUICK, resume=checkpoint_of(stopped)).solution
+    assert resumed.projector.law == stopped.solution.projector.law
+
+
+def test_other_maps_are_refused(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    checkpoint = checkpoint_of(oracle)
+    with pytest.raises(InputError, match="view1: a frame of the earlier calibration is missing"):
+        calibrate(views.maps[:1], rig, QUICK, resume=checkpoint)
+    holes = views.maps[1].q.copy()
+    holes[20:50] = np.nan
+    with pytest.raises(InputError, match="view1: is not the map of the earlier calibration"):
+        calibrate(views.with_map(1, holes).maps, rig, QUICK, resume=checkpoint)
+
+
+def test_another_plan_is_refused(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    surface = "shared" if rig.share.surface == "per_frame" else "per_frame"
+    other = rig.model_copy(update={"share": rig.share.model_copy(update={"surface": surface})})
+    with pytest.raises(InputError, match=r"share\.surface"):
+        calibrate(views.maps, other, QUICK, resume=checkpoint_of(oracle))
+
+
+def test_command_goes_on_from_a_folder(tmp_path: Path) -> None:
+    """Oracle: the folder resumed from, which had converged."""
+    views = look(relief_surface(), steps(2), projector_poses(2))
+    rig = views.rig().model_dump(mode="json", exclude={"drift"})
+    (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
+    paths = []
+    for map_ in views.maps:
+        paths.append(tmp_path / f"{map_.name}.npz")
+        np.savez(paths[-1], map=map_.q)
+    common = ["calibrate", *paths, "--rig", tmp_path / "rig.yaml", "--quiet"]
+    assert run(*common, "--out", tmp_path / "first").exit_code == 0
+    result = run(*common, "--out", tmp_path / "second", "--resume", tmp_path / "first")
+    assert result.exit_code == 0, result.stderr
+    first, second = (load_solution(tmp_path / name) for name in ("first", "second"))
+    assert second.projector.focal.value == pytest.approx(first.projector.focal.value, rel=1e-4)
+    assert "registration" not in second.timings
+    missing = run(*common, "--out", tmp_path / "third", "--resume", tmp_path)
+    assert missing.exit_code == 2
+    assert "state.npz" in missing.stderr
