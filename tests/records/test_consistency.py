@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES, check_maps
+from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES, check_maps, fault
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Rig
 
@@ -57,6 +57,19 @@ def test_too_few(count: int):
         check_maps([map_], _rig())
     else:
         assert "map.npz: map: the map has 49 usable" in _sentence([map_], _rig())
+
+
+def test_faulty_among_sound():
+    """Oracle: the contract; useless maps matter only where there is no other, sizes always."""
+    empty, sound = _map("empty.npz"), _map("sound.npz")
+    empty.q[:] = np.nan
+    check_maps([empty, sound], _rig())
+    said = fault(empty, _rig())
+    assert said is not None
+    assert "0 usable" in said.what
+    assert fault(sound, _rig()) is None
+    assert _sentence([empty], _rig()).startswith("empty.npz: map: the map has 0 usable")
+    assert "map is 12 x 20" in _sentence([sound, _map("c.npz", HEIGHT, WIDTH)], _rig())
 
 
 def test_half_a_correspondence_is_none():
