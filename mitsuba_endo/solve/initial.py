@@ -34,8 +34,10 @@ def cell_size(frame: Observations, camera: CameraModel, cell_px: float | None) -
         cell_px: spacing in pixels, or None to choose it.
     """
     if cell_px is None:
-        blocks = np.unique(frame.pixels // _BLOCK, axis=0)
-        area = len(blocks) * _BLOCK**2
+        x, y = frame.pixels.T // _BLOCK
+        covered = np.zeros((y.max() + 1, x.max() + 1), bool)
+        covered[y, x] = True
+        area = float(covered.sum() * _BLOCK**2)
         vertices = min(len(frame.rays) / PER_VERTEX, MAX_VERTICES)
         cell_px = float(np.sqrt(area / vertices))
     return cell_px * pixel_angle(camera)

@@ -132,7 +132,7 @@ def lattice_over(directions: NDArray[np.float64], cell: float, margin: int = 1) 
         cell: lattice spacing, radians.
         margin: cells added around, held by smoothness alone.
     """
-    ij = np.unique(np.floor(lattice_position(directions, cell)).astype(np.int64), axis=0)
+    ij = np.floor(lattice_position(directions, cell)).astype(np.int64)
     low = ij.min(0) - margin
     columns, rows = np.ptp(ij, axis=0) + 1 + 2 * margin
     cells = np.zeros((int(rows), int(columns)), bool)

@@ -74,16 +74,14 @@ class NormalEquations:
             weight: (N,) robust weights.
             chart: (L, G) from global steps to the frame's local ones.
         """
-        root = np.sqrt(weight)
-        rows = surface_rows(lin, root, len(self.surfaces[surface].g))
-        local = (lin.J_local * root).transpose(1, 0, 2).reshape(len(chart), 2 * len(root))
-        r = (residual * root).ravel()
         block = self.surfaces[surface]
         block.A = block.A + surface_hessian(lin, weight)
-        block.B += (rows.T @ local.T) @ chart
-        block.g += rows.T @ r
-        self.D += chart.T @ (local @ local.T) @ chart
-        self.g += chart.T @ (local @ r)
+        block.B += surface_products(lin, weight * lin.J_local) @ chart
+        block.g += surface_products(lin, (weight * residual)[:, None])[:, 0]
+        for J, r in zip(lin.J_local, residual, strict=True):
+            weighted = J * weight
+            self.D += chart.T @ (weighted @ J.T) @ chart
+            self.g += chart.T @ (weighted @ r)
 
     def add_global(self, hessian: NDArray[np.float64], gradient: NDArray[np.float64]) -> None:
         """Add a term over global unknowns only."""
@@ -145,6 +143,20 @@ def surface_hessian(lin: Linearisation, weight: NDArray[np.float64]) -> sp.csr_a
             for a, b in {(i, j), (j, i)}:
                 data += np.bincount(pattern.positions[:, a, b], of_face, len(data))
     return sp.csr_array((data, pattern.indices, pattern.indptr), (lattice.size, lattice.size))
+
+
+def surface_products(lin: Linearisation, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return J^T values (V, n) of one frame over its surface, for values (2, n, N) of u and v.
+
+    Summed by triangle first, as in :func:`surface_hessian`.
+    """
+    lattice, J = lin.lattice, lin.J_surface
+    out = np.zeros((values.shape[1], lattice.size))
+    for i in range(3):
+        for row, (u, v) in zip(out, values.transpose(1, 0, 2), strict=True):
+            of_face = np.bincount(lin.faces, J[0, i] * u + J[1, i] * v, len(lattice.faces))
+            row += np.bincount(lattice.faces[:, i], of_face, lattice.size)
+    return out.T
 
 
 def surface_rows(lin: Linearisation, root: NDArray[np.float64], vertices: int) -> sp.csr_array:
