@@ -11,6 +11,7 @@ from .doctor import doctor
 from .evaluate import evaluate
 from .export import export
 from .render import render
+from .report import report
 
 app = typer.Typer(
     name="mitsuba-endo",
@@ -18,7 +19,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, doctor, render, calibrate, evaluate, export):
+for command in (demo, doctor, render, calibrate, evaluate, report, export):
     app.command()(command)
 
 

@@ -98,6 +98,14 @@ def surface_figure(view: SurfaceView, unit: str) -> Figure:
     return figure
 
 
+def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:
+    """Draw camera, projectors and surface from above."""
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    projectors, unit = _projectors(calibration.solution), unit_name(calibration.solution)
+    panels.rig_section(figure.subplots(), view, calibration.camera, projectors, unit)
+    return figure
+
+
 def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     """Draw what tells a good calibration from a bad one at one look: maps, residuals, surface.
 

@@ -1,8 +1,7 @@
 """The folder that a calibration leaves behind."""
 
 import csv
-import re
-from dataclasses import astuple, fields
+from dataclasses import astuple, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,9 @@ from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
 from ..records.surface import save_surface
 from . import figures
+from .map_names import map_names, observed_names
+from .read_folder import save_observed
+from .report import REPORT, save_report
 from .scene_file import save_scene
 from .view import SurfaceView, view_surface
 
@@ -37,10 +39,12 @@ def write_solution_folder(
     scene.xml             the calibrated scene; left out, with a warning in solution.json, where a
                           value it needs could not be determined
     rendered*.exr         projector coordinates rendered from the solution, one file a frame
+    observed*.exr         projector coordinates as they came in, and which of them were used
     trace.csv             the iterations
     state.npz             from which ``calibrate --resume`` goes on
     rig.yaml              the rig with all defaults filled in, if given
-    overview.png          look at this first; the other pictures show the same at full size:
+    report.html           look at this first: verdict, maps, numbers, provenance; needs no network
+    overview.png          the same at one look; the other pictures show the same at full size:
                           observed, rendered, residual, histogram, surface, convergence
     ====================  =========================================================================
 
@@ -59,20 +63,18 @@ def write_solution_folder(
         save_trace(folder / "trace.csv", calibration.trace)
         if calibration.checkpoint is not None:
             save_checkpoint(folder / CHECKPOINT, calibration.checkpoint)
-        for name, frame in zip(map_names(calibration), calibration.frames, strict=True):
+        names = [frame.name for frame in calibration.frames]
+        for name, frame in zip(map_names(names), calibration.frames, strict=True):
             save_map(folder / name, frame.rendered)
+        for name, frame in zip(observed_names(names), calibration.frames, strict=True):
+            save_observed(folder / name, frame)
         if rig is not None:
             _save_rig(folder / "rig.yaml", rig)
-        _save_pictures(folder, calibration, view_surface(calibration.surface, calibration.camera))
+        view = view_surface(calibration.surface, calibration.camera)
+        _save_pictures(folder, calibration, view)
+        shown = replace(calibration, solution=solution)
+        save_report(folder / REPORT, [(Path(path).name, shown)], [view])
     return solution
-
-
-def map_names(calibration: Calibration) -> list[str]:
-    """Return the file names of the rendered maps: ``rendered.exr``, or one a frame."""
-    if len(calibration.frames) == 1:
-        return ["rendered.exr"]
-    plain = [re.sub(r"[^\w.-]+", "_", frame.name) for frame in calibration.frames]
-    return [f"rendered_{i:02d}_{Path(name).stem}.exr" for i, name in enumerate(plain)]
 
 
 def own_surface_name(frame: int) -> str:

@@ -19,15 +19,25 @@ from mitsuba_endo.records.rig import Rig, load_rig
 from mitsuba_endo.records.solution import Estimate, PoseEstimate, load_solution
 from mitsuba_endo.records.surface import load_surface
 from mitsuba_endo.show import solution_folder
+from mitsuba_endo.show.map_names import map_names
 from mitsuba_endo.show.scene_file import save_scene
-from mitsuba_endo.show.solution_folder import map_names, write_solution_folder
+from mitsuba_endo.show.solution_folder import write_solution_folder
 
 SIZE = {"width": 64, "height": 46}
 PICTURES = {
     "overview.png", "observed.png", "rendered.png", "residual.png", "histogram.png",
     "surface.png", "convergence.png",
 }  # fmt: skip
-FILES = {"solution.json", "surface.ply", "scene.xml", "trace.csv", "rendered.exr", ".mitsuba-endo"}
+FILES = {
+    "solution.json",
+    "surface.ply",
+    "scene.xml",
+    "trace.csv",
+    "rendered.exr",
+    "observed.exr",
+    "report.html",
+    ".mitsuba-endo",
+}
 Maker = Callable[..., Calibration]
 
 
@@ -47,6 +57,7 @@ def written(tmp_path_factory: pytest.TempPathFactory, calibration: Calibration) 
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures, which take a second and are not what these tests look at."""
     monkeypatch.setattr(solution_folder, "_save_pictures", lambda *_: None)
+    monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
 
 
 def test_files(written: Path):
@@ -207,7 +218,7 @@ def test_several_frames(tmp_path: Path, make_calibration: Maker):
     """Oracle: one map a frame, names made safe for a file system, none twice."""
     calibration = make_calibration(**SIZE, count=3)
     write_solution_folder(tmp_path / "out", calibration)
-    names = map_names(calibration)
+    names = map_names([frame.name for frame in calibration.frames])
     assert names == [f"rendered_{i:02d}_run_frame_{i}.exr" for i in range(3)]
     for name, frame in zip(names, calibration.frames, strict=True):
         np.testing.assert_array_equal(load_map(tmp_path / "out" / name).q, frame.rendered)
@@ -240,6 +251,7 @@ def test_interrupted_leaves_the_old_or_nothing(
     """Oracle: the folder's content before Ctrl-C fell into the drawing of the pictures."""
     out = tmp_path / "out"
     monkeypatch.setattr(solution_folder, "_save_pictures", lambda *_: None)
+    monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
     if existing:
         write_solution_folder(out, calibration)
     before = sorted(str(p) for p in tmp_path.rglob("*"))

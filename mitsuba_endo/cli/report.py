@@ -1,0 +1,39 @@
+"""``mitsuba-endo report``: the report of a result, or of several side by side."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .console import Debug, Json, Quiet, session
+
+Results = Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Solution folders.")]
+Out = Annotated[Path, typer.Option("--out", help="HTML file to write.")]
+
+
+def report(
+    results: Results,
+    out: Out = Path("report.html"),
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Make the report of one result, or compare several."""
+    with session(quiet, as_json, debug) as output:
+        from ..show.read_folder import read_solution_folder
+        from ..show.report import save_report
+
+        calibrations = [read_solution_folder(path) for path in results]
+        save_report(out, list(zip(_names(results), calibrations, strict=True)))
+        output.print(f"{out}: open it in a browser.")
+        output.summary({"report": str(out), "results": [str(r) for r in results]})
+
+
+def _names(results: list[Path]) -> list[str]:
+    """Return the folders' names, with as much of their paths as tells them apart."""
+    folders = [(r.parent if r.name == "solution.json" else r).absolute() for r in results]
+    for depth in range(1, max(len(f.parts) for f in folders) + 1):
+        names = ["/".join(f.parts[-depth:]) for f in folders]
+        if len(set(names)) == len(set(folders)):
+            return names
+    return [str(f) for f in folders]

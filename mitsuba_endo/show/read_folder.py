@@ -1,0 +1,83 @@
+"""A solution folder back as the calibration that wrote it."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..records.calibration import Calibration, FrameMaps, TraceRow
+from ..records.correspondence import CHANNELS, read_exr, write_exr
+from ..records.solution import load_solution
+from ..records.surface import load_surface
+from .map_names import map_names, observed_names
+
+USED = "used"
+"""Channel of the observed maps: 1 where the solver used the correspondence."""
+
+
+def save_observed(path: str | Path, frame: FrameMaps) -> None:
+    """Write the observed coordinates and which of them were used as OpenEXR."""
+    channels = {name: frame.observed[..., i] for i, name in enumerate(CHANNELS)}
+    write_exr(path, {**channels, USED: frame.used.astype(np.float32)})
+
+
+def read_solution_folder(path: str | Path) -> Calibration:
+    """Read what pictures and reports are made of; the checkpoint and the other surfaces stay.
+
+    Raises:
+        InputError: a file is missing or damaged.
+    """
+    folder = Path(path)
+    if folder.name == "solution.json":
+        folder = folder.parent
+    solution = load_solution(folder)
+    if solution.camera is None or solution.surface is None:
+        what = "camera" if solution.camera is None else "surface"
+        raise InputError(f"{what} is missing", str(folder / "solution.json"), "calibrate again")
+    names = [frame.name for frame in solution.frames]
+    frames = [
+        _frame(folder, name, rendered, observed)
+        for name, rendered, observed in zip(
+            names, map_names(names), observed_names(names), strict=True
+        )
+    ]
+    surface = load_surface(folder / solution.surface)
+    trace = _trace(folder / "trace.csv")
+    return Calibration(solution, solution.camera.to_model(), surface, frames, trace)
+
+
+def _frame(folder: Path, name: str, rendered: str, observed: str) -> FrameMaps:
+    maps = read_exr(folder / rendered)
+    seen = read_exr(folder / observed)
+    if USED not in seen:
+        raise InputError(f"channel {USED} is missing", str(folder / observed), "calibrate again")
+    used = seen[USED] > 0
+    return FrameMaps(
+        name, _stacked(seen, folder / observed), _stacked(maps, folder / rendered), used
+    )
+
+
+def _stacked(channels: dict[str, NDArray[np.float32]], path: Path) -> NDArray[np.float32]:
+    missing = [name for name in CHANNELS if name not in channels]
+    if missing:
+        raise InputError(f"channel {missing[0]} is missing", str(path), "calibrate again")
+    return np.stack([channels[name] for name in CHANNELS], -1)
+
+
+def _trace(path: Path) -> list[TraceRow]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return [
+                TraceRow(
+                    int(row["iteration"]), float(row["seconds"]), float(row["cost"]),
+                    float(row["focal"]) if row["focal"] else None, float(row["damping"]),
+                    float(row["scale_px"]), float(row["step"]),
+                )
+                for row in csv.DictReader(file)
+            ]  # fmt: skip
+    except OSError:
+        raise InputError("no such file", str(path), "calibrate again") from None
+    except (KeyError, ValueError, TypeError):
+        raise InputError("is not a table of iterations", str(path), "calibrate again") from None

@@ -1,0 +1,71 @@
+"""``report.html``: everything about one result, or several side by side, in one offline file."""
+
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+
+from ..files import atomic_path
+from ..records.calibration import Calibration
+from . import report_sections as sections
+from .view import SurfaceView, view_surface
+
+REPORT = "report.html"
+
+
+def save_report(
+    path: str | Path, results: Sequence[tuple[str, Calibration]], views: Sequence[SurfaceView] = ()
+) -> None:
+    """Write one self-contained page: no network, no other file.
+
+    Args:
+        path: the HTML file.
+        results: name and calibration of each result; several stand side by side.
+        views: of the surfaces, where they are at hand already.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    views = views or [view_surface(c.surface, c.camera) for _, c in results]
+    page = _page(results, views)
+    with atomic_path(path) as aside:
+        aside.write_text(page, encoding="utf-8")
+
+
+def _page(results: Sequence[tuple[str, Calibration]], views: Sequence[SurfaceView]) -> str:
+    names = [name for name, _ in results]
+    several = len(results) > 1
+    compared = ""
+    if several:
+        table = sections.comparison(names, [c.solution for _, c in results])
+        compared = f"<h3>Compared, with 95 % intervals</h3>{table}<p></p>"
+    articles = "".join(
+        _article(i, name, calibration, view)
+        for i, ((name, calibration), view) in enumerate(zip(results, views, strict=True))
+    )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<link rel="icon" href="data:,">'
+        f"<title>Calibration: {escape(', '.join(names))}</title><style>{_asset('report.css')}"
+        f"</style></head><body{' class=many' if several else ''}>"
+        f"<h1>Calibration {'results' if several else 'result'}</h1>"
+        '<p class="lead">mitsuba-endo; camera frame: x right, y down, z forward; '
+        "X_projector = R X_camera + t</p>"
+        f'{compared}<main class="results">{articles}</main>'
+        f"<script>{_asset('report.js')}</script></body></html>\n"
+    )
+
+
+def _article(number: int, name: str, calibration: Calibration, view: SurfaceView) -> str:
+    solution = calibration.solution
+    return (
+        f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
+        f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
+        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(calibration, view)}"
+        f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"
+    )
+
+
+def _asset(name: str) -> str:
+    return resources.files("mitsuba_endo.show").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,200 @@
+"""Sections of the report as HTML; text that comes from files is escaped here."""
+
+import json
+from html import escape
+
+from matplotlib.figure import Figure
+
+from ..records.calibration import Calibration
+from ..records.solution import Outcome, Solution
+from . import figures
+from .numbers import Row, rows
+from .view import SurfaceView
+from .web_images import MapImages, MapPages, Scale, figure_image, figure_svg, map_pages
+
+_CHART_INCHES = 5.2
+"""Width at which the smallest label is readable in half a page."""
+
+
+def verdict(solution: Solution) -> str:
+    """Say what was measured, what was not, and what to be wary of."""
+    settled = solution.outcome in (Outcome.CONVERGED, Outcome.TRUTH)
+    outcome = solution.outcome.replace("_", " ")
+    sentences = solution.verdict or ["The solution holds no verdict."]
+    out = f'<p><span class="badge{"" if settled else " wary"}">{escape(outcome)}</span></p>'
+    out += _list("verdict", [*sentences, given(solution)])
+    notes = [
+        *solution.warnings,
+        *(f"Frame {left.name} is left out: {left.reason}" for left in solution.left_out),
+    ]
+    return out + (f"<h3>Warnings</h3>{_list('notes', notes)}" if notes else "")
+
+
+def given(solution: Solution) -> str:
+    """Say which values are input, not results."""
+    projector = solution.projector
+    names = {
+        "focal length": projector.focal, "centre": projector.centre, "aspect": projector.aspect,
+        "distortion": projector.distortion,
+    }  # fmt: skip
+    fixed = [f"projector {name}" for name, e in names.items() if e.status == "fixed"]
+    return f"Given, not measured: {', '.join(['camera intrinsics', *fixed])}."
+
+
+def _list(kind: str, sentences: list[str]) -> str:
+    items = "".join(f"<li>{escape(s)}</li>" for s in sentences)
+    return f'<ul class="{kind}">{items}</ul>'
+
+
+def number_table(solution: Solution) -> str:
+    """Return the table of values with their 95 % intervals."""
+    body, group = "", None
+    for row in rows(solution):
+        if row.group != group:
+            group = row.group
+            body += f'<tr class="group"><th colspan="5">{escape(group)}</th></tr>'
+        why = f'<br><span class="reason">{escape(row.reason)}</span>' if row.reason else ""
+        body += (
+            f'<tr class="{escape(row.status)}"><td>{escape(row.quantity)}</td>'
+            f'<td class="number">{_minus(row.value)}</td><td class="number">{row.interval}</td>'
+            f"<td>{escape(row.unit)}</td><td>{escape(_status(row.status))}{why}</td></tr>"
+        )
+    head = (
+        '<tr><th>Quantity</th><th class="number">Value</th><th class="number">95 % interval</th>'
+        "<th>Unit</th><th>Status</th></tr>"
+    )
+    return f'<div class="scroll"><table><thead>{head}</thead><tbody>{body}</tbody></table></div>'
+
+
+def comparison(names: list[str], solutions: list[Solution]) -> str:
+    """Set the same quantities of several solutions side by side; frames are matched by order."""
+    columns = [_keyed(s) for s in solutions]
+    keys = list(dict.fromkeys(key for column in columns for key in column))
+    head = "".join(f'<th class="number">{escape(n)}</th>' for n in names)
+    body = ""
+    for key in keys:
+        cells = "".join(f'<td class="number">{_cell(c.get(key))}</td>' for c in columns)
+        body += f"<tr><td>{escape(key[0])}</td><td>{escape(key[1])}</td>{cells}"
+        body += f"<td>{escape(next(c[key].unit for c in columns if key in c))}</td></tr>"
+    top = f"<tr><th></th><th>Quantity</th>{head}<th>Unit</th></tr>"
+    return f'<div class="scroll"><table><thead>{top}</thead><tbody>{body}</tbody></table></div>'
+
+
+def _keyed(solution: Solution) -> dict[tuple[str, str], Row]:
+    order = {f.name: f"Frame {i + 1}" for i, f in enumerate(solution.frames)}
+    return {(order.get(r.group, r.group), r.quantity): r for r in rows(solution)}
+
+
+def _cell(row: Row | None) -> str:
+    return "-" if row is None else f"{_minus(row.value)} {row.interval}"
+
+
+def _status(status: str) -> str:
+    return {"fixed": "given", "unobservable": "not determined"}.get(status, status)
+
+
+def _minus(value: str) -> str:
+    return escape(value.replace("-", "−") if value[:1] == "-" else value)
+
+
+def viewer(calibration: Calibration, number: int) -> str:
+    """Return observed, rendered and residual maps with sliders for frame and blend."""
+    frames = calibration.frames
+    pages = map_pages(frames)
+    slider = ""
+    if len(frames) > 1:
+        slider = (
+            f'<label>Frame <input type="range" name="frame" min="0" max="{len(frames) - 1}" '
+            f'value="0" step="1"></label><output>{escape(frames[0].name)}</output>'
+        )
+    radios = "".join(
+        f'<label><input type="radio" name="coordinate-{number}" value="{c}"'
+        f"{' checked' if c == 'x' else ''}> projector {c}</label>"
+        for c in "xy"
+    )
+    blend = (
+        '<label>observed <input type="range" name="blend" min="0" max="100" value="0" '
+        'aria-label="blend from observed to rendered"> rendered</label>'
+    )
+    panels = "".join(
+        _panels(images, pages, i, coordinate, frames[i].name)
+        for i, pair in enumerate(pages.images)
+        for coordinate, images in enumerate(pair)
+    )
+    return f'<div class="viewer"><div class="controls">{slider}{radios}{blend}</div>{panels}</div>'
+
+
+def _panels(images: MapImages, pages: MapPages, frame: int, coordinate: int, name: str) -> str:
+    axis = "xy"[coordinate]
+    hidden = "" if frame == coordinate == 0 else " hidden"
+    return (
+        f'<div class="panels" data-frame="{frame}" data-coordinate="{axis}" '
+        f'data-name="{escape(name)}"{hidden}>'
+        f'<figure><div class="stack"><img alt="observed projector {axis}" src="{images.observed}">'
+        f'<img alt="rendered projector {axis}" src="{images.rendered}"></div>'
+        f"{_bar(pages.coordinate_scales[coordinate])}</figure>"
+        f'<figure><img class="residual" alt="residual {axis}" src="{images.residual}">'
+        f"{_bar(pages.residual_scale)}</figure></div>"
+    )
+
+
+def _bar(scale: Scale) -> str:
+    return (
+        f'<div class="bar"><span>{_minus(scale.low)}</span><img alt="" src="{scale.image}">'
+        f"<span>{_minus(scale.high)}</span></div><figcaption>{escape(scale.note)}</figcaption>"
+    )
+
+
+def charts(calibration: Calibration, view: SurfaceView) -> str:
+    """Return surface, residual distribution, rig and convergence."""
+    solution, trace = calibration.solution, calibration.trace
+    scale = trace[-1].scale_px if trace else None
+    surface = figure_image(figures.surface_figure(view, figures.unit_name(solution)))
+    drawn = [
+        ("residual distribution", figures.histogram_figure(
+            calibration.frames, solution.noise_px, scale
+        )),
+        ("rig from above", figures.rig_figure(calibration, view)),
+    ]  # fmt: skip
+    if trace:
+        drawn.append(("convergence", figures.convergence_figure(trace)))
+    images = "".join(_chart(alt, figure) for alt, figure in drawn)
+    return (
+        f'<h3>Surface</h3><img class="wide" alt="surface and its uncertainty" src="{surface}">'
+        f'<h3>Residuals, rig and convergence</h3><div class="charts">{images}</div>'
+    )
+
+
+def _chart(name: str, figure: Figure) -> str:
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(_CHART_INCHES, _CHART_INCHES * height / width)
+    note = (
+        "<figcaption>The cost is in units of the robust scale, and so jumps where that changes "
+        "(dotted).</figcaption>"
+        if name == "convergence"
+        else ""
+    )
+    return f'<figure><img alt="{name}" src="{figure_svg(figure)}">{note}</figure>'
+
+
+def provenance(solution: Solution) -> str:
+    """Return how the result came about: versions, timings, options with the seed, the rig."""
+    versions = ", ".join(f"{k} {v}" for k, v in solution.versions.items()) or "not recorded"
+    seconds = ", ".join(f"{k} {v:.1f} s" for k, v in solution.timings.items()) or "not recorded"
+    seed = solution.configuration.get("options", {}).get("seed", "not recorded")
+    law = solution.projector.law.replace("_", " ")
+    facts = "".join(
+        f"<tr><th>{name}</th><td>{escape(str(text))}</td></tr>"
+        for name, text in (
+            ("Projector law", law), ("Seed", seed), ("Times", seconds), ("Versions", versions),
+        )
+    )  # fmt: skip
+    details = "".join(
+        f"<details><summary>{title}</summary><pre>"
+        f"{escape(json.dumps(data, indent=1, ensure_ascii=False))}</pre></details>"
+        for title, data in (
+            ("Configuration", solution.configuration), ("Law evidence", solution.law_evidence),
+        )
+        if data
+    )  # fmt: skip
+    return f"<table>{facts}</table>{details}"

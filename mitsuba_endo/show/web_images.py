@@ -1,0 +1,132 @@
+"""Maps and figures as images inside a web page."""
+
+import base64
+import io
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import matplotlib
+import numpy as np
+from matplotlib.colors import Normalize, to_rgb
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ..records.calibration import FrameMaps
+from .colours import MISSING, RESIDUAL, UNUSED, banded
+from .panels import coordinate_limits, residual_range
+
+_PIXELS = 5_000_000
+"""Of all maps together: keeps the page below 3 MB whatever the number of frames."""
+_MAX_SIDE = 640
+_QUALITY = 85
+_FIGURE_DPI = 96
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A colour bar."""
+
+    image: str
+    """Data URI of a strip, low to high."""
+    low: str
+    high: str
+    note: str
+
+
+@dataclass(frozen=True)
+class MapImages:
+    """Images of one coordinate in one frame, data URIs."""
+
+    observed: str
+    rendered: str
+    residual: str
+
+
+@dataclass(frozen=True)
+class MapPages:
+    """Images of all frames; the two coordinates, x and y, are the inner lists."""
+
+    images: list[list[MapImages]]
+    coordinate_scales: list[Scale]
+    residual_scale: Scale
+
+
+def map_pages(frames: list[FrameMaps]) -> MapPages:
+    """Colour the maps of all frames on common scales."""
+    limits = [coordinate_limits(frames, c) for c in (0, 1)]
+    scales = [banded(float(low), float(high)) for low, high in limits]
+    limit = residual_range(frames)
+    height, width = frames[0].observed.shape[:2]
+    room = math.sqrt(_PIXELS / (6 * len(frames) * width * height))
+    shrink = min(1.0, room, _MAX_SIDE / max(width, height))
+    images = [
+        [
+            MapImages(
+                _uri(_coloured(frame.observed[..., c], *scales[c][:2]), shrink),
+                _uri(_coloured(frame.rendered[..., c], *scales[c][:2]), shrink),
+                _uri(_residual(frame, c, limit), shrink),
+            )
+            for c in (0, 1)
+        ]
+        for frame in frames
+    ]
+    bars = [
+        _scale(colours, norm, f"projector {name}, pattern px, bands of {step:g}")
+        for name, (colours, norm, step) in zip("xy", scales, strict=True)
+    ]
+    note = "observed - rendered, pattern px; dark grey: not used"
+    residuals = _scale(matplotlib.colormaps[RESIDUAL], Normalize(-limit, limit), note)
+    return MapPages(images, bars, residuals)
+
+
+def figure_svg(figure: Figure) -> str:
+    """Return a line drawing as the data URI of an SVG."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "report"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return _data_uri("image/svg+xml", buffer.getvalue())
+
+
+def figure_image(figure: Figure) -> str:
+    """Return a figure that holds images as the data URI of a WebP."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_FIGURE_DPI)
+    image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
+    assert image is not None
+    return _uri(image[..., ::-1].astype(np.float64) / 255, 1.0)
+
+
+def _coloured(q: NDArray[Any], colours: Any, norm: Normalize) -> NDArray[np.float64]:
+    return colours(norm(np.ma.masked_invalid(q)))[..., :3]
+
+
+def _residual(frame: FrameMaps, channel: int, limit: float) -> NDArray[np.float64]:
+    values = frame.residual[..., channel]
+    image = matplotlib.colormaps[RESIDUAL](Normalize(-limit, limit)(np.nan_to_num(values)))[..., :3]
+    image[~(frame.used & np.isfinite(values))] = to_rgb(MISSING)
+    image[np.isfinite(frame.observed).all(-1) & ~frame.used] = to_rgb(UNUSED)
+    return image
+
+
+def _scale(colours: Any, norm: Normalize, note: str) -> Scale:
+    low, high = float(norm.vmin or 0), float(norm.vmax or 0)
+    strip = colours(np.linspace(0, 1, 360, endpoint=False))[None, :, :3]
+    return Scale(_uri(strip, 1.0, lossless=True), f"{low:.3g}", f"{high:.3g}", note)
+
+
+def _uri(rgb: NDArray[np.float64], shrink: float, lossless: bool = False) -> str:
+    """Encode an (H, W, 3) image, 0 to 1, made smaller by a factor."""
+    image = np.ascontiguousarray(np.round(255 * rgb[..., ::-1]).astype(np.uint8))
+    if shrink < 1:
+        size = [max(1, round(shrink * n)) for n in image.shape[1::-1]]
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    quality = 101 if lossless else _QUALITY
+    done, data = cv2.imencode(".webp", image, [cv2.IMWRITE_WEBP_QUALITY, quality])
+    assert done  # OpenCV's wheels hold the encoder
+    return _data_uri("image/webp", data.tobytes())
+
+
+def _data_uri(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -1,0 +1,257 @@
+"""``report.html``: one offline file that says everything and works in a browser."""
+
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from html import escape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.records.calibration import Calibration
+from mitsuba_endo.records.solution import Estimate, LeftOut, PoseEstimate
+from mitsuba_endo.show.read_folder import read_solution_folder
+from mitsuba_endo.show.report import save_report
+from mitsuba_endo.show.solution_folder import write_solution_folder
+from mitsuba_endo.show.web_images import map_pages
+
+Maker = Callable[..., Calibration]
+VERDICT = ["Focal length: 900 ± 0.82 px (95 %).", "Centre: not determined; x < y & more."]
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+class Page(HTMLParser):
+    """What the page refers to, and its visible text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.panels: list[tuple[str, str]] = []
+        self.tags: list[str] = []
+        self.words = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        named = dict(attrs)
+        self.tags.append(tag)
+        self.references += [v or "" for k, v in attrs if k in ("src", "href", "srcset", "data")]
+        if named.get("class") == "panels":
+            self.panels.append((named["data-frame"] or "", named["data-coordinate"] or ""))
+
+    def handle_data(self, data: str) -> None:
+        self.words += data
+
+
+def _worded(calibration: Calibration) -> Calibration:
+    from dataclasses import replace
+
+    changes = {
+        "verdict": VERDICT,
+        "warnings": ["the scale drifts"],
+        "left_out": [LeftOut(name="dark.exr", reason="nothing decoded")],
+        "versions": {"mitsuba": "3.9.1"},
+        "configuration": {"options": {"seed": 41}},
+    }
+    return replace(calibration, solution=calibration.solution.model_copy(update=changes))
+
+
+@pytest.fixture(scope="module")
+def calibration(make_calibration: Maker) -> Calibration:
+    return _worded(make_calibration(width=200, height=150, count=3))
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory, calibration: Calibration) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    save_report(path, [("left/result <1>", calibration)])
+    return path
+
+
+def test_is_self_contained(report: Path):
+    """Oracle: every reference of the parsed page is a data URI, and the style has none."""
+    text = report.read_text(encoding="utf-8")
+    page = Page(text)
+    assert len(page.references) > 18
+    assert all(r.startswith("data:") for r in page.references)
+    assert not re.search(r"url\(|@import|https?:", text)
+    assert report.stat().st_size < 3_000_000
+
+
+def test_says_everything(report: Path, calibration: Calibration):
+    """Oracle: the solution's sentences and numbers; text from files is not markup."""
+    page = Page(report.read_text(encoding="utf-8"))
+    assert page.words.index(VERDICT[0]) < page.words.index("Observed, rendered, residual")
+    for words in (
+        *VERDICT, "the scale drifts", "Frame dark.exr is left out: nothing decoded",
+        "left/result <1>", "mitsuba 3.9.1", "41", "± 0.82", "run/frame_2.exr",
+        "Given, not measured: camera intrinsics, projector centre, projector aspect",
+    ):  # fmt: skip
+        assert words in page.words, words
+    assert page.panels == [(str(f), c) for f in range(3) for c in "xy"]
+    assert escape("result <1>") in report.read_text(encoding="utf-8")
+    assert calibration.solution.outcome in page.words
+
+
+def test_maps_show_the_values(calibration: Calibration):
+    """Oracle: the colour scale read at the true value, away from borders between its bands."""
+    from mitsuba_endo.show.colours import banded
+    from mitsuba_endo.show.panels import coordinate_limits
+
+    pages = map_pages(calibration.frames)
+    scale, norm, step = banded(*map(float, coordinate_limits(calibration.frames, 1)))
+    image = _pixels(pages.images[2][1].rendered)
+    q = calibration.frames[2].rendered[..., 1]
+    assert image.shape[:2] == q.shape
+    inner = np.abs((q / step) % 1 - 0.5) < 0.35
+    inner &= cv2.blur(inner.astype(np.float32), (3, 3)) > 0.99
+    expected = 255 * np.asarray(scale(norm(q)))[..., :3]
+    assert inner.sum() > 1000
+    # The images are compressed with loss.
+    assert np.median(np.abs(image - expected)[inner]) < 6
+
+
+def _pixels(uri: str) -> np.ndarray:
+    import base64
+
+    data = np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    assert image is not None
+    return image[..., ::-1].astype(float)
+
+
+def test_many_frames_stay_small(make_calibration: Maker, tmp_path: Path):
+    """Oracle: the limit of 3 MB, with more pixels than fit at full size."""
+    one = make_calibration(width=427, height=342)
+    many = type(one)(one.solution, one.camera, one.surface, one.frames * 12, one.trace)
+    started = time.perf_counter()
+    save_report(tmp_path / "report.html", [("many", many)])
+    assert time.perf_counter() - started < 20
+    assert (tmp_path / "report.html").stat().st_size < 3_000_000
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, make_calibration: Maker) -> Path:
+    """A solution folder of two frames."""
+    path = tmp_path_factory.mktemp("results") / "out"
+    write_solution_folder(path, make_calibration(width=64, height=46, count=2))
+    return path
+
+
+def test_folder_gives_the_same_report(folder: Path, make_calibration: Maker, tmp_path: Path):
+    """Oracle: the arrays and the page made before they were written."""
+    calibration = make_calibration(width=64, height=46, count=2)
+    read = read_solution_folder(folder / "solution.json")
+    for mine, theirs in zip(calibration.frames, read.frames, strict=True):
+        np.testing.assert_array_equal(mine.observed, theirs.observed)
+        np.testing.assert_array_equal(mine.rendered, theirs.rendered)
+        np.testing.assert_array_equal(mine.used, theirs.used)
+    assert read.trace == calibration.trace
+    save_report(tmp_path / "again.html", [("out", read)])
+    first, second = (
+        Page(path.read_text(encoding="utf-8"))
+        for path in (folder / "report.html", tmp_path / "again.html")
+    )
+    assert first.words == second.words
+    assert first.panels == second.panels
+
+
+def test_missing_map_is_named(folder: Path, tmp_path: Path):
+    """Oracle: the name of the file that was taken away."""
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    (copy / "observed_01_run_frame_1.exr").unlink()
+    with pytest.raises(InputError, match=r"observed_01_run_frame_1\.exr: no such file"):
+        read_solution_folder(copy)
+
+
+def test_unknown_values_are_said(tmp_path: Path, make_calibration: Maker):
+    """Oracle: null focal length and pose appear as not determined, with the reason."""
+    from dataclasses import replace
+
+    base = make_calibration(width=64, height=46)
+    reason = "the surface is one plane"
+    focal = Estimate(value=None, status="unobservable", reason=reason)
+    pose = PoseEstimate(R=None, t=None, status="unobservable", reason="too little is seen")
+    solution = base.solution.model_copy(
+        update={
+            "projector": base.solution.projector.model_copy(update={"focal": focal}),
+            "frames": [base.solution.frames[0].model_copy(update={"projector_from_camera": pose})],
+        }
+    )
+    save_report(tmp_path / "r.html", [("x", replace(base, solution=solution))])
+    words = Page((tmp_path / "r.html").read_text(encoding="utf-8")).words
+    assert words.count("not determined") == 4
+    assert reason in words
+    assert "too little is seen" in words
+
+
+def test_results_stand_side_by_side(tmp_path: Path, make_calibration: Maker):
+    """Oracle: both names head a column that holds each one's focal length."""
+    from dataclasses import replace
+
+    one = make_calibration(width=64, height=46)
+    projector = one.solution.projector.model_copy(
+        update={"focal": Estimate(value=912.5, std=0.21, status="measured")}
+    )
+    other = replace(one, solution=one.solution.model_copy(update={"projector": projector}))
+    save_report(tmp_path / "r.html", [("first", one), ("second", other)])
+    page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+    assert page.tags.count("article") == 2
+    assert "firstsecondUnit" in page.words
+    assert "focal length900.00 ± 0.82912.50 ± 0.41pattern px" in page.words
+
+
+_PROBE = """<script>
+window.faults = [];
+window.addEventListener("error", (e) => window.faults.push(e.message));
+window.addEventListener("load", () => {
+  const move = (name, value) => {
+    const input = document.querySelector(`[name=${name}]`);
+    input.value = value;
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  document.querySelector("[type=radio][value=y]").click();
+  move("frame", 2);
+  move("blend", 60);
+  const shown = [...document.querySelectorAll(".panels")].filter((p) => p.offsetHeight > 0);
+  const broken = [...document.images].filter((i) => i.complete && !i.naturalWidth).length;
+  const found = [
+    shown.map((p) => p.dataset.frame + p.dataset.coordinate).join(),
+    getComputedStyle(shown[0].querySelector("img + img")).opacity,
+    document.querySelector("output").textContent, broken, window.faults.join() || "none",
+    document.documentElement.scrollWidth <= window.innerWidth,
+  ];
+  const note = document.createElement("p");
+  note.id = "probe";
+  note.textContent = found.join("|");
+  document.body.append(note);
+});
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium installed")
+def test_works_in_a_browser(report: Path, tmp_path: Path):
+    """Oracle: chromium: third frame and y shown, blended, no picture broken, no console error."""
+    probed = tmp_path / "probed.html"
+    text = report.read_text(encoding="utf-8")
+    probed.write_text(text.replace("<head>", f"<head>{_PROBE}", 1), encoding="utf-8")
+    done = subprocess.run(
+        [
+            str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
+            "--disable-background-networking", "--disable-component-update", "--disable-sync",
+            f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1200,900",
+            "--enable-logging=stderr", "--virtual-time-budget=3000", "--dump-dom",
+            probed.as_uri(),
+        ],
+        capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    found = re.search(r'<p id="probe">(.*?)</p>', done.stdout)
+    assert found is not None
+    assert found[1] == "2y|0.6|run/frame_2.exr|0|none|true"
+    assert "CONSOLE" not in done.stderr
