@@ -6,10 +6,12 @@ import typer
 
 from .. import __version__
 from .calibrate import calibrate
+from .decode_stack import decode_stack
 from .demo import demo
 from .doctor import doctor
 from .evaluate import evaluate
 from .export import export
+from .patterns import patterns
 from .render import render
 from .report import report
 

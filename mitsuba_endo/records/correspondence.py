@@ -40,7 +40,7 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     path = Path(path)
     if not path.is_file():
         raise InputError("no such file", str(path), "check the path")
-    _check_suffix(path)
+    check_map_path(path)
     q = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
     _check(q, str(path))
     return CorrespondenceMap(np.where(np.isfinite(q).all(-1, keepdims=True), q, np.nan), path.name)
@@ -52,7 +52,7 @@ def save_map(path: str | Path, q: NDArray[np.floating]) -> None:
     Raises:
         InputError: another suffix, or the folder cannot be written.
     """
-    _check_suffix(Path(path))
+    check_map_path(Path(path))
     q = np.ascontiguousarray(q, dtype=np.float32)
     if Path(path).suffix.lower() == ".npz":
         # An open file, because NumPy appends its own suffix to names that end in .NPZ.
@@ -92,7 +92,12 @@ def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
         raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
 
 
-def _check_suffix(path: Path) -> None:
+def check_map_path(path: Path) -> None:
+    """Refuse, before any work is done, a path that is not that of a map.
+
+    Raises:
+        InputError: a suffix other than .exr and .npz.
+    """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"unknown kind of map '{path.suffix}'", str(path), "give an .exr or .npz file"

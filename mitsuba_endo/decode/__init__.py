@@ -1,0 +1,1 @@
+"""From images of projected patterns to correspondence maps. NumPy and OpenCV only."""

@@ -1,0 +1,138 @@
+"""Stacks on disk: ``NN_LABEL.png``, numbered in the order of projection."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..files import atomic_folder
+from .plan import StackPlan
+from .stack import Stack, patterns
+
+SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
+_LABEL = re.compile(r"(?:[xy]_(?:gray\d+(?:_inverse)?|phase[\d.]+_step\d+)|white|black)$")
+DEPTHS = (8, 10, 12, 14, 16)
+"""Bits of common sensors: 16-bit files often hold fewer."""
+
+
+def save_patterns(folder: str | Path, plan: StackPlan) -> list[str]:
+    """Write the images to project as 8-bit PNG and return their names in order.
+
+    Raises:
+        InputError: the folder holds other files or cannot be written.
+    """
+    labels = plan.labels()
+    digits = len(str(len(labels) - 1))
+    names = [f"{i:0{digits}d}_{label}.png" for i, label in enumerate(labels)]
+    with atomic_folder(folder) as aside:
+        for name, image in zip(names, patterns(plan), strict=True):
+            # OpenCV reports a full disk by its return value only.
+            if not cv2.imwrite(str(aside / name), image):
+                raise OSError("the image was not written")
+    return names
+
+
+def stack_paths(given: Sequence[str | Path]) -> list[Path]:
+    """Return the images: those given, or those of the one folder given, by number and name.
+
+    Raises:
+        InputError: a file is missing, or the folder holds no image.
+    """
+    paths = [Path(p) for p in given]
+    if len(paths) == 1 and paths[0].is_dir():
+        inside = [p for p in paths[0].iterdir() if p.suffix.lower() in SUFFIXES]
+        if not inside:
+            raise InputError("holds no image", str(paths[0]), f"put {', '.join(SUFFIXES)} there")
+        return sorted(inside, key=_natural)
+    for path in paths:
+        if not path.is_file():
+            raise InputError("no such image", str(path), "give image files or one folder")
+    return paths
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    parts = re.split(r"(\d+)", path.name.lower())
+    return [(int(p), "") if p.isdigit() else (-1, p) for p in parts if p]
+
+
+def check_names(paths: Sequence[Path], plan: StackPlan) -> None:
+    """Compare the number of files, and names that end in a label, with the plan.
+
+    Raises:
+        InputError: images are missing, too many or in another order.
+    """
+    labels = plan.labels()
+    found = [_label(path) for path in paths]
+    missing = [label for label in labels if label not in found]
+    if None not in found and missing:
+        raise InputError(f"the image of {missing[0]} is missing", "stack", "add it")
+    if len(paths) != len(labels):
+        raise InputError(
+            f"{len(paths)} images, but this pattern has {len(labels)}", "stack",
+            f"give {_abridged(labels)}",
+        )  # fmt: skip
+    for path, label, name in zip(paths, labels, found, strict=True):
+        if name is not None and name != label:
+            raise InputError(
+                f"stands where {label} is expected", str(path), "put the images in order"
+            )
+
+
+def _label(path: Path) -> str | None:
+    match = _LABEL.search(path.stem)
+    return match.group() if match else None
+
+
+def _abridged(labels: Sequence[str]) -> str:
+    shown = labels if len(labels) <= 6 else [*labels[:4], "...", labels[-1]]
+    return ", ".join(shown)
+
+
+def load_stack(paths: Sequence[str | Path]) -> Stack:
+    """Read 8- or 16-bit images, colour or gray, of linear brightness.
+
+    Full scale of 16-bit files is the smallest of 10, 12, 14 and 16 bits that holds them all.
+
+    Raises:
+        InputError: an image is missing, damaged, of another kind or of another size.
+    """
+    raw = [_read(Path(path)) for path in paths]
+    first = raw[0]
+    for path, image in zip(paths, raw, strict=True):
+        if image.shape[:2] != first.shape[:2]:
+            raise InputError(
+                f"is {image.shape[1]} x {image.shape[0]} pixels, the first image "
+                f"{first.shape[1]} x {first.shape[0]}",
+                str(path), "give images of one size",
+            )  # fmt: skip
+        if image.dtype != first.dtype:
+            raise InputError(
+                f"is {image.dtype}, the first image {first.dtype}", str(path), "give one kind"
+            )
+    brightest = max(int(image.max()) for image in raw)
+    wide = first.dtype == np.uint16
+    bits = next(b for b in (DEPTHS[1:] if wide else DEPTHS) if brightest < 2**b)
+    levels = 2**bits - 1
+    return Stack(
+        images=np.stack([image.mean(-1, dtype=np.float32) / levels for image in raw]),
+        saturated=np.stack([(image >= levels).any(-1) for image in raw]),
+        levels=levels,
+    )
+
+
+def _read(path: Path) -> NDArray[np.integer]:
+    """Read (H, W, C); an alpha channel is left out."""
+    if not path.is_file():
+        raise InputError("no such image", str(path), "check the path")
+    # Decoding from memory: OpenCV's own reader prints to stderr about damaged files.
+    image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise InputError("is not a readable image", str(path), "make it again")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"is {image.dtype}", str(path), "give 8- or 16-bit images")
+    pixels: NDArray[np.integer] = np.asarray(image)  # pyright: ignore[reportAssignmentType]
+    return pixels[..., None] if pixels.ndim == 2 else pixels[..., :3]
