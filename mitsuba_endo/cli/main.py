@@ -21,7 +21,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-for command in (demo, doctor, render, calibrate, evaluate, report, export):
+COMMANDS = (demo, doctor, render, patterns, decode_stack, calibrate, evaluate, report, export)
+for command in COMMANDS:
     app.command()(command)
 
 
