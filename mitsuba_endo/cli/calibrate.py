@@ -158,7 +158,7 @@ def report(solution: "Solution", out: Path, output: Session) -> None:
 
     warnings = [f"warning: {warning}" for warning in solution.warnings]
     output.print(solution_table(solution), *solution.verdict, *warnings)
-    output.print(f"Outcome: {solution.outcome}. Look at {out}/overview.png first.")
+    output.print(f"Outcome: {solution.outcome}. Look at {out}/report.html first.")
     output.summary(
         {"folder": str(out), "solution": solution.model_dump(mode="json", by_alias=True)}
     )

@@ -88,7 +88,7 @@ def _report(
         *solution.verdict,
         f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
         f"  {out}/capture/image.png        what the endoscope sees",
-        f"  {out}/solution/overview.png    maps, residuals, surface and rig",
+        f"  {out}/solution/report.html     verdict, maps, residuals, surface and rig",
         f"  {out}/solution/solution.json   the result, {out}/metrics.json its errors",
         f"Again by hand: mitsuba-endo calibrate {out}/input/map.exr "
         f"--rig {out}/input/rig.yaml --out result",

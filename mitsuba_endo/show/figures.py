@@ -18,6 +18,8 @@ from .view import SurfaceView
 DPI = 110
 _PANEL_AREA = 13.0  # square inches of image in a panel
 _MAX_COLUMNS = 4
+_MAX_NUMBERED = 14
+"""Unknowns up to which a correlation matrix has room for its numbers."""
 
 
 def save_figure(path: str | Path, figure: Figure) -> None:
@@ -74,7 +76,7 @@ def histogram_figure(
 def convergence_figure(trace: list[TraceRow]) -> Figure:
     """Draw cost and, where it is one number, focal length against the iteration."""
     with_focal = any(row.focal is not None for row in trace)
-    figure = Figure(figsize=(7, 6 if with_focal else 3.5), layout="constrained")
+    figure = Figure(figsize=(7, 7 if with_focal else 4), layout="constrained")
     axes = np.atleast_1d(figure.subplots(2 if with_focal else 1, sharex=True))
     panels.trace_cost(axes[0], trace)
     if with_focal:
@@ -103,6 +105,15 @@ def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     figure = Figure(figsize=(7, 4.5), layout="constrained")
     projectors, unit = _projectors(calibration.solution), unit_name(calibration.solution)
     panels.rig_section(figure.subplots(), view, calibration.camera, projectors, unit)
+    return figure
+
+
+def correlation_figure(unknowns: list[str], matrix: list[list[float | None]]) -> Figure:
+    """Draw the correlation matrix of the unknowns; grey where one has no variance."""
+    figure = Figure(figsize=(7, 5), layout="constrained")
+    axes = figure.subplots()
+    values = np.array([[np.nan if v is None else v for v in row] for row in matrix])
+    panels.correlation(axes, unknowns, values, numbers=len(unknowns) <= _MAX_NUMBERED)
     return figure
 
 

@@ -37,16 +37,22 @@ def rows(solution: Solution) -> list[Row]:
         ("aspect", "aspect", "fy/fx"), ("distortion", "distortion", ""),
     ):  # fmt: skip
         out += _estimate("Projector", quantity, getattr(projector, name), unit)
-    for frame in solution.frames:
-        out += _frame(frame, solution.units)
+    for i, frame in enumerate(solution.frames):
+        gives_scale = i == 0 and solution.scale in ("baseline", "up_to_scale")
+        out += _frame(frame, solution.units, gives_scale)
     return out
 
 
-def _frame(frame: Frame, units: str) -> list[Row]:
+def _frame(frame: Frame, units: str, gives_scale: bool) -> list[Row]:
     out = []
     if frame.focal is not None:
         out += _estimate(frame.name, "focal length", frame.focal, "pattern px")
     out += _pose(frame.name, "projector", frame.projector_from_camera, units)
+    pose = frame.projector_from_camera.to_transform()
+    if pose is not None:
+        length = "mm" if units == "mm" else "baselines"
+        status = "fixed" if gives_scale else frame.projector_from_camera.status
+        out.append(Row(frame.name, "baseline", f"{np.linalg.norm(pose.t):.5g}", "", length, status))
     if frame.world_from_camera.status != "fixed":
         out += _pose(frame.name, "camera", frame.world_from_camera, units)
     if frame.rms_px is not None:

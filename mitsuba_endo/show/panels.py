@@ -19,6 +19,10 @@ from .colours import CAMERA, DEPTH, MISSING, PROJECTOR, RESIDUAL, UNUSED, banded
 from .view import SurfaceView
 
 PX = "pattern px"
+_DARK = 0.65
+"""Correlation from which its colour is too dark for black text."""
+_DENSE = 30
+"""Unknowns from which their names must be small."""
 
 
 def image_axes(axes: Axes, title: str) -> None:
@@ -193,3 +197,31 @@ def trace_focal(axes: Axes, trace: list[TraceRow]) -> None:
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(color="0.9", lw=0.6)
+
+
+def correlation(
+    axes: Axes, unknowns: list[str], values: NDArray[np.float64], numbers: bool
+) -> None:
+    """Draw a correlation matrix (N, N), NaN in grey, with its numbers where there is room."""
+    scale = matplotlib.colormaps[RESIDUAL].with_extremes(bad=MISSING)
+    edges = np.arange(len(unknowns) + 1) - 0.5
+    shown = axes.pcolormesh(
+        edges, edges, np.ma.masked_invalid(values), cmap=scale, vmin=-1, vmax=1, edgecolors="w",
+        linewidth=0.5,
+    )  # fmt: skip
+    if numbers:
+        for (row, column), value in np.ndenumerate(values):
+            if np.isfinite(value):
+                colour = "w" if abs(value) > _DARK else "k"
+                text = f"{value:.2f}".replace("-0.00", "0.00")
+                axes.text(column, row, text, color=colour, size=6, ha="center", va="center")
+    size = "x-small" if len(unknowns) <= _DENSE else 4
+    counted = [str(i + 1) for i in range(len(unknowns))]
+    named = [f"{name}   {i}" for name, i in zip(unknowns, counted, strict=True)]
+    axes.set_xticks(range(len(unknowns)), counted, size=size)
+    axes.set_yticks(range(len(unknowns)), named, size=size)
+    axes.tick_params(length=0)
+    axes.set_aspect("equal")
+    axes.invert_yaxis()
+    axes.set_title("Correlation of the unknowns")
+    axes.figure.colorbar(shown, ax=axes, shrink=0.6, aspect=25).ax.tick_params(labelsize="x-small")

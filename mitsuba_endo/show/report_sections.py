@@ -25,7 +25,11 @@ def verdict(solution: Solution) -> str:
     out += _list("verdict", [*sentences, given(solution)])
     notes = [
         *solution.warnings,
-        *(f"Frame {left.name} is left out: {left.reason}" for left in solution.left_out),
+        *(
+            f"Frame {left.name} is left out: {left.reason}"
+            for left in solution.left_out
+            if not any(left.name in warning for warning in solution.warnings)
+        ),
     ]
     return out + (f"<h3>Warnings</h3>{_list('notes', notes)}" if notes else "")
 
@@ -158,6 +162,11 @@ def charts(calibration: Calibration, view: SurfaceView) -> str:
     ]  # fmt: skip
     if trace:
         drawn.append(("convergence", figures.convergence_figure(trace)))
+    known = solution.observability.get("correlation")
+    if known:
+        drawn.append(
+            ("correlation", figures.correlation_figure(known["unknowns"], known["matrix"]))
+        )
     images = "".join(_chart(alt, figure) for alt, figure in drawn)
     return (
         f'<h3>Surface</h3><img class="wide" alt="surface and its uncertainty" src="{surface}">'

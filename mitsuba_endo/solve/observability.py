@@ -23,6 +23,8 @@ _DRAGGED = 0.05
 """The same for an unknown that the direction alone makes weak."""
 _FLAT = 0.02
 """Depth relief over lateral extent below which a surface counts as nearly planar."""
+_MAX_CORRELATED = 60
+"""Unknowns up to which their correlations are recorded; more cannot be looked at."""
 
 WORDS = {
     "camera_pose": "camera pose",
@@ -111,6 +113,28 @@ def free_directions(
         mixes = [names[i].words(plan) for i in order if share[i] > least[i]]
         out.append(Direction(std, mixes))
     return out
+
+
+def correlation(
+    covariance: NDArray[np.float64], names: list[Unknown], plan: Plan
+) -> dict[str, Any] | None:
+    """Return the correlation matrix of the unknowns for the record, or None above 60 unknowns.
+
+    Entries of unknowns without a finite positive variance are None.
+    """
+    if not 0 < len(names) <= _MAX_CORRELATED:
+        return None
+    with np.errstate(all="ignore"):
+        std = np.sqrt(np.diag(covariance))
+        matrix = covariance / np.outer(std, std)
+    has_variance = np.isfinite(std) & (std > 0)
+    known = np.isfinite(matrix) & np.outer(has_variance, has_variance)
+    rounded = np.round(np.where(known, matrix, 0.0), 4).tolist()
+    entries = [
+        [value if is_known else None for value, is_known in zip(*row, strict=True)]
+        for row in zip(rounded, known.tolist(), strict=True)
+    ]
+    return {"unknowns": [n.words(plan) for n in names], "matrix": entries}
 
 
 def advice(blocks: set[str], law: str, flat: bool) -> str:

@@ -50,7 +50,8 @@ def test_demo_leaves_everything_it_names(finished: tuple[Path, dict[str, Any]]):
     out, _ = finished
     for name in (
         "capture/image.png", "capture/truth.json", "input/map.exr", "input/rig.yaml",
-        "solution/overview.png", "solution/solution.json", "solution/surface.ply", "metrics.json",
+        "solution/report.html", "solution/overview.png", "solution/solution.json",
+        "solution/surface.ply", "metrics.json",
     ):  # fmt: skip
         assert (out / name).stat().st_size > 100, name
     assert [p.name for p in out.parent.iterdir()] == ["out"]

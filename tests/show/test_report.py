@@ -191,6 +191,22 @@ def test_unknown_values_are_said(tmp_path: Path, make_calibration: Maker):
     assert "too little is seen" in words
 
 
+def test_correlations_are_drawn_where_known(tmp_path: Path, make_calibration: Maker):
+    """Oracle: one picture more; a value that is not known does not stop it."""
+    from dataclasses import replace
+
+    base = make_calibration(width=64, height=46)
+    known = {"unknowns": ["focal length", "aspect ratio"], "matrix": [[1.0, None], [None, None]]}
+    solution = base.solution.model_copy(update={"observability": {"correlation": known}})
+    counts = []
+    for name, calibration in (("with", replace(base, solution=solution)), ("without", base)):
+        save_report(tmp_path / name, [("x", calibration)])
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        counts.append(Page(text).tags.count("img"))
+        assert ('alt="correlation"' in text) == (name == "with")
+    assert counts[0] == counts[1] + 1
+
+
 def test_results_stand_side_by_side(tmp_path: Path, make_calibration: Maker):
     """Oracle: both names head a column that holds each one's focal length."""
     from dataclasses import replace

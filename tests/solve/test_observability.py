@@ -6,6 +6,7 @@ import pytest
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.solve.observability import (
     advice,
+    correlation,
     free_directions,
     is_flat,
     status_of,
@@ -107,3 +108,32 @@ def test_flatness():
     for relief, flat in ((0.01, True), (0.05, False)):
         points = rng.normal(size=(2000, 3)) * [30, 20, 20 * relief]
         assert is_flat(RigidTransform.of([0.3, -0.5, 0.2], [5, 6, 70]).apply(points)) == flat
+
+
+class TestCorrelation:
+    def test_is_free_of_units(self):
+        """Oracle: cosines between the columns of a square root of the covariance."""
+        names, plan = named(centre="shared")
+        mixing = np.random.default_rng(3).normal(size=(8, 8)) * [1, 2, 3, 40, 5, 6, 7, 800]
+        found = correlation(mixing.T @ mixing, names, plan)
+        assert found is not None
+        cosines = mixing / np.linalg.norm(mixing, axis=0)
+        np.testing.assert_allclose(found["matrix"], cosines.T @ cosines, atol=6e-5)
+        assert found["unknowns"] == [n.words(plan) for n in names]
+
+    def test_leaves_out_what_has_no_variance(self):
+        """Oracle: an unknown with no variance, or an infinite one, correlates with nothing."""
+        names, plan = named()
+        variance = np.array([1.0, 0.0, np.inf, 4.0, 1.0, 1.0])
+        found = correlation(np.diag(variance), names, plan)
+        assert found is not None
+        expected = np.eye(6).astype(object)
+        expected[[1, 2]], expected[:, [1, 2]] = None, None
+        assert found["matrix"] == expected.tolist()
+
+    def test_of_too_many_unknowns_is_not_recorded(self):
+        """Oracle: eleven frames have more than sixty unknowns."""
+        names, plan = named(11)
+        assert len(names) > 60
+        assert correlation(np.eye(len(names)), names, plan) is None
+        assert correlation(np.zeros((0, 0)), [], plan) is None
