@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 from pydantic.dataclasses import dataclass
 
+from ..decode.grid_pattern import COLOURS, CodedGrid
 from ..errors import InputError
 from ..shapes.registry import CHECKED, Positive
-
-COLOURS = {"green": (0.05, 1.0, 0.12), "white": (1.0, 1.0, 1.0)}
 
 
 @dataclass(frozen=True, kw_only=True, config=CHECKED)
@@ -43,7 +42,10 @@ class GridPattern:
         return np.exp(-0.5 * ((from_middle - np.round(from_middle)) / self.line) ** 2)
 
 
-PATTERNS: dict[str, type[GridPattern]] = {"grid": GridPattern}
+PATTERNS: dict[str, type[GridPattern] | type[CodedGrid]] = {
+    "grid": GridPattern,
+    "coded": CodedGrid,
+}
 """Every pattern that a scene can ask for, by name."""
 
 
