@@ -80,7 +80,7 @@ def joint_problem(
         _projector_poses(starts, placed, plan),
         _intrinsics(starts, plan),
     )
-    density = float(np.median([len(s.observations.rays) / s.lattice.size for s in starts]))
+    density = sum(len(s.observations.rays) for s in starts) / lattice.size
     focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
     disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
     prior = curvature_prior(lattice, prior_weight(density), disparity)

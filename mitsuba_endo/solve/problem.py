@@ -72,7 +72,7 @@ class CurvaturePrior:
 
 
 def prior_weight(density: float) -> float:
-    """Return the weight of a prior for ``density`` correspondences per vertex seen by a frame."""
+    """Return the weight of a prior for ``density`` correspondences per vertex."""
     return _WEIGHT * density
 
 
