@@ -20,6 +20,11 @@ _DAMPING_RANGE = (1e-10, 1e-4)
 """Least damping, and the least that a rejected step leads to."""
 _LOOSE = 10.0
 """Factor of the tolerance in the first stage."""
+_CREEP, _LEAST_GAIN, _PATIENCE = 2.0, 0.05, 2
+"""Converged too after so many steps in a row, each below ``_CREEP`` standard deviations, that gain
+less log-likelihood than ``_LEAST_GAIN`` per global unknown, as a step of 0.3 standard deviations
+does on a smooth cost. A surface of triangles gives a moving camera a cost with kinks, over which
+small steps never end."""
 _TRIES = 8
 """Steps tried in one iteration before it counts as stalled."""
 
@@ -51,7 +56,7 @@ class GaussNewton:
     def init(self, state: State) -> None:
         """Evaluate the starting state."""
         self._began = time.perf_counter()
-        self._mu = _FIRST_DAMPING
+        self._mu, self._useless = _FIRST_DAMPING, 0
         self._now = evaluate(self.objective.problem, state)
         self.objective.sigma = estimate_noise(self._now)
 
@@ -59,14 +64,24 @@ class GaussNewton:
         """Make one iteration; return how the optimisation ended, or None to go on."""
         if len(self.trace) >= self.max_iterations:
             return Outcome.MAX_ITERATIONS
+        before = self.objective.cost(self._now)
         accepted, size = self._descend(self.objective.normal_equations(self._now))
+        gain = (before - self.objective.cost(self._now)) / self.objective.sigma**2
         self._record(size)
         # The first stage only leads to the last one, whose optimum is another.
         settled = size < self.tolerance * (_LOOSE if self.objective.stage == 0 else 1.0)
+        settled |= self._creeps(size, gain)
         if not accepted and not settled:
             return self._leave_stage(Outcome.STALLED)
         steady = self.objective.follow(self._now)
         return self._leave_stage(Outcome.CONVERGED) if settled and steady else None
+
+    def _creeps(self, size: float, gain: float) -> bool:
+        """Tell whether the last steps were small and useless."""
+        unknowns = max(self.objective.problem.plan.columns, 1)
+        useless = size < _CREEP and gain < _LEAST_GAIN * unknowns
+        self._useless = self._useless + 1 if useless else 0
+        return self._useless >= _PATIENCE
 
     def _leave_stage(self, outcome: Outcome) -> Outcome | None:
         return None if self.objective.next_stage(self._now) else outcome
