@@ -103,7 +103,7 @@ def surface_figure(view: SurfaceView, unit: str) -> Figure:
 def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     """Draw camera, projectors and surface from above."""
     figure = Figure(figsize=(7, 4.5), layout="constrained")
-    projectors, unit = _projectors(calibration.solution), unit_name(calibration.solution)
+    projectors, unit = projector_poses(calibration.solution), unit_name(calibration.solution)
     panels.rig_section(figure.subplots(), view, calibration.camera, projectors, unit)
     return figure
 
@@ -142,7 +142,7 @@ def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     limit = panels.residual_range([worst])
     panels.residual(axes[0, 2], worst, 0, limit, f"Residual x{_of(worst, frames, 'worst: ')}")
     panels.depth(axes[1, 0], view, unit)
-    panels.rig_section(axes[1, 1], view, calibration.camera, _projectors(solution), unit)
+    panels.rig_section(axes[1, 1], view, calibration.camera, projector_poses(solution), unit)
     scale = calibration.trace[-1].scale_px if calibration.trace else None
     panels.residual_histogram(axes[1, 2], frames, solution.noise_px, scale)
     figure.suptitle(headline(solution))
@@ -185,7 +185,7 @@ def _quantity(value: Any, std: Any, status: str, unit: str) -> str:
     return f"{digits} {unit}" + ("" if status == "measured" else f" ({status})")
 
 
-def _projectors(solution: Solution) -> list[RigidTransform]:
+def projector_poses(solution: Solution) -> list[RigidTransform]:
     """Return every known projector's pose in the first camera's frame."""
     first = solution.frames[0].world_from_camera.to_transform()
     found = []

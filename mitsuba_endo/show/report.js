@@ -20,7 +20,93 @@ function connectViewer(viewer) {
   show();
 }
 
+function decoded(text) {
+  return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+}
+
+// Points sorted by depth and painted back to front: needs no WebGL, so it works everywhere.
+function connectScene(canvas) {
+  const data = JSON.parse(canvas.dataset.scene);
+  const points = new Float32Array(decoded(data.points));
+  const colours = new Uint8Array(decoded(data.colours));
+  const count = points.length / 3;
+  const order = Uint32Array.from({ length: count }, (_, i) => i);
+  const [sx, sy, depth] = [0, 1, 2].map(() => new Float32Array(count));
+  const context = canvas.getContext("2d");
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  const include = (p) => p.forEach((v, i) => {
+    low[i] = Math.min(low[i], v);
+    high[i] = Math.max(high[i], v);
+  });
+  for (let i = 0; i < count; i++) include([points[3 * i], points[3 * i + 1], points[3 * i + 2]]);
+  data.lines.forEach((line) => line.segments.forEach((s) => s.forEach(include)));
+  const centre = low.map((v, i) => (v + high[i]) / 2);
+  const radius = Math.hypot(...low.map((v, i) => (high[i] - v) / 2));
+  let yaw, pitch, zoom, pending = false;
+
+  function project(x, y, z, scale, width, height) {
+    const [cy, sy_, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
+    const [dx, dy, dz] = [x - centre[0], y - centre[1], z - centre[2]];
+    const u = cy * dx + sy_ * dz, w = -sy_ * dx + cy * dz;
+    const v = cp * dy - sp * w, d = sp * dy + cp * w;
+    const near = 4 * radius / (4 * radius + d);
+    return [width / 2 + scale * near * u, height / 2 + scale * near * v, d, near];
+  }
+  function draw() {
+    pending = false;
+    const ratio = window.devicePixelRatio || 1;
+    const width = canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+    const height = canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    const scale = zoom * 0.5 * Math.min(width, height) / radius;
+    for (let i = 0; i < count; i++) {
+      const at = project(points[3 * i], points[3 * i + 1], points[3 * i + 2], scale, width, height);
+      sx[i] = at[0]; sy[i] = at[1]; depth[i] = at[2];
+    }
+    order.sort((a, b) => depth[b] - depth[a]);
+    const side = Math.max(1.5 * ratio, 1.5 * scale * data.size);
+    for (const i of order) {
+      context.fillStyle = `rgb(${colours[3 * i]},${colours[3 * i + 1]},${colours[3 * i + 2]})`;
+      context.fillRect(sx[i] - side / 2, sy[i] - side / 2, side, side);
+    }
+    context.lineWidth = 1.5 * ratio;
+    for (const line of data.lines) {
+      context.strokeStyle = line.colour;
+      for (const [a, b] of line.segments) {
+        const [p, q] = [a, b].map((c) => project(...c, scale, width, height));
+        context.beginPath();
+        context.moveTo(p[0], p[1]);
+        context.lineTo(q[0], q[1]);
+        context.stroke();
+      }
+    }
+  }
+  function redraw() {
+    if (!pending) requestAnimationFrame(draw);
+    pending = true;
+  }
+  function reset() {
+    [yaw, pitch, zoom] = [0.45, -0.35, 1.45];
+    redraw();
+  }
+  canvas.addEventListener("pointerdown", (e) => canvas.setPointerCapture(e.pointerId));
+  canvas.addEventListener("pointermove", (e) => {
+    if (!canvas.hasPointerCapture(e.pointerId)) return;
+    yaw -= e.movementX * 0.008;
+    pitch = Math.max(-1.57, Math.min(1.57, pitch + e.movementY * 0.008));
+    redraw();
+  });
+  canvas.addEventListener("wheel", (e) => {
+    e.preventDefault();
+    zoom = Math.max(0.2, Math.min(20, zoom * Math.exp(-e.deltaY * 0.001)));
+    redraw();
+  }, { passive: false });
+  canvas.addEventListener("dblclick", reset);
+  window.addEventListener("resize", redraw);
+  reset();
+}
+
 document.querySelectorAll(".viewer").forEach(connectViewer);
+document.querySelectorAll("canvas.scene").forEach(connectScene);
 window.addEventListener("beforeprint", () => {
   document.querySelectorAll("details").forEach((d) => { d.open = true; });
 });

@@ -11,6 +11,7 @@ from . import figures
 from .numbers import Row, rows
 from .view import SurfaceView
 from .web_images import MapImages, MapPages, Scale, figure_image, figure_svg, map_pages
+from .web_scene import scene_canvas
 
 _CHART_INCHES = 5.2
 """Width at which the smallest label is readable in half a page."""
@@ -170,6 +171,7 @@ def charts(calibration: Calibration, view: SurfaceView) -> str:
     images = "".join(_chart(alt, figure) for alt, figure in drawn)
     return (
         f'<h3>Surface</h3><img class="wide" alt="surface and its uncertainty" src="{surface}">'
+        f"<h3>Surface and rig in space</h3><figure>{scene_canvas(calibration, view)}</figure>"
         f'<h3>Residuals, rig and convergence</h3><div class="charts">{images}</div>'
     )
 

@@ -152,7 +152,7 @@ def test_headline_never_shows_what_is_unknown(calibration: Calibration):
 def test_projectors_are_placed_in_the_first_camera(make_calibration: Maker):
     """Oracle: the same rig seen from the first camera: camera motion times the fixed rig."""
     solution = make_calibration(**SIZE, count=2).solution
-    found = figures._projectors(solution)
+    found = figures.projector_poses(solution)
     pose = solution.frames[0].projector_from_camera.to_transform()
     motion = solution.frames[1].world_from_camera.to_transform()
     assert pose is not None

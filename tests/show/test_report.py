@@ -1,5 +1,7 @@
 """``report.html``: one offline file that says everything and works in a browser."""
 
+import base64
+import json
 import re
 import shutil
 import subprocess
@@ -19,7 +21,9 @@ from mitsuba_endo.records.solution import Estimate, LeftOut, PoseEstimate
 from mitsuba_endo.show.read_folder import read_solution_folder
 from mitsuba_endo.show.report import save_report
 from mitsuba_endo.show.solution_folder import write_solution_folder
+from mitsuba_endo.show.view import view_surface
 from mitsuba_endo.show.web_images import map_pages
+from mitsuba_endo.show.web_scene import scene_canvas
 
 Maker = Callable[..., Calibration]
 VERDICT = ["Focal length: 900 ± 0.82 px (95 %).", "Centre: not determined; x < y & more."]
@@ -117,8 +121,6 @@ def test_maps_show_the_values(calibration: Calibration):
 
 
 def _pixels(uri: str) -> np.ndarray:
-    import base64
-
     data = np.frombuffer(base64.b64decode(uri.partition(",")[2]), np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_COLOR)
     assert image is not None
@@ -207,6 +209,28 @@ def test_correlations_are_drawn_where_known(tmp_path: Path, make_calibration: Ma
     assert counts[0] == counts[1] + 1
 
 
+def test_frusta_stand_where_the_solution_says(calibration: Calibration):
+    """Oracle: camera at the origin; each projector's apex is -R^T t, moved to the first camera."""
+    text = scene_canvas(calibration, view_surface(calibration.surface, calibration.camera))
+    data = json.loads(re.findall(r'data-scene="(.*?)"', text)[0].replace("&quot;", '"'))
+    apexes = [line["segments"][0][0] for line in data["lines"]]
+    expected = [[0.0, 0.0, 0.0]]
+    first = calibration.solution.frames[0].world_from_camera.to_transform()
+    assert first is not None
+    for frame in calibration.solution.frames:
+        pose, world = frame.projector_from_camera, frame.world_from_camera.to_transform()
+        assert world is not None
+        centre = -np.array(pose.R).T @ np.array(pose.t)
+        expected.append(first.R.T @ (world.R @ centre + world.t - first.t))
+    np.testing.assert_allclose(apexes, expected, atol=1e-5)
+    assert [len(line["segments"]) for line in data["lines"]] == [8, 8, 8, 8]
+    points = np.frombuffer(base64.b64decode(data["points"]), "<f4").reshape(-1, 3)
+    pixels = calibration.camera.project(points.astype(float))
+    # Vertices of the grid of pixels: the points are where rays of pixels meet the surface.
+    np.testing.assert_allclose(pixels, np.round(pixels), atol=1e-3)
+    assert 4000 < len(points) < 13000
+
+
 def test_results_stand_side_by_side(tmp_path: Path, make_calibration: Maker):
     """Oracle: both names head a column that holds each one's focal length."""
     from dataclasses import replace
@@ -225,6 +249,8 @@ def test_results_stand_side_by_side(tmp_path: Path, make_calibration: Maker):
 
 _PROBE = """<script>
 window.faults = [];
+// A headless page with nothing on a screen gets no frames to animate.
+window.requestAnimationFrame = (draw) => setTimeout(draw, 0);
 window.addEventListener("error", (e) => window.faults.push(e.message));
 window.addEventListener("load", () => {
   const move = (name, value) => {
@@ -237,7 +263,26 @@ window.addEventListener("load", () => {
   move("blend", 60);
   const shown = [...document.querySelectorAll(".panels")].filter((p) => p.offsetHeight > 0);
   const broken = [...document.images].filter((i) => i.complete && !i.naturalWidth).length;
+  const scene = document.querySelector("canvas.scene");
+  const painted = () => {
+    const copy = document.createElement("canvas");
+    [copy.width, copy.height] = [scene.width, scene.height];
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(scene, 0, 0);
+    const pixels = context.getImageData(0, 0, scene.width, scene.height).data;
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      if (pixels[i + 3] > 0) count += 1;
+    }
+    return count / scene.width / scene.height;
+  };
+  setTimeout(() => {
+  const before = painted();
+  scene.dispatchEvent(new WheelEvent("wheel", { deltaY: 700, cancelable: true }));
+  setTimeout(() => {
+  const after = painted();
   const found = [
+    before > 0.02 && after > 0.005 && after < 0.6 * before,
     shown.map((p) => p.dataset.frame + p.dataset.coordinate).join(),
     getComputedStyle(shown[0].querySelector("img + img")).opacity,
     document.querySelector("output").textContent, broken, window.faults.join() || "none",
@@ -247,13 +292,16 @@ window.addEventListener("load", () => {
   note.id = "probe";
   note.textContent = found.join("|");
   document.body.append(note);
+  }, 400);
+  }, 400);
 });
 </script>"""
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium installed")
 def test_works_in_a_browser(report: Path, tmp_path: Path):
-    """Oracle: chromium: third frame and y shown, blended, no picture broken, no console error."""
+    """Oracle: chromium: third frame and y shown, blended, the scene painted and smaller
+    after the wheel, no picture broken, no console error."""
     probed = tmp_path / "probed.html"
     text = report.read_text(encoding="utf-8")
     probed.write_text(text.replace("<head>", f"<head>{_PROBE}", 1), encoding="utf-8")
@@ -262,12 +310,12 @@ def test_works_in_a_browser(report: Path, tmp_path: Path):
             str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
             "--disable-background-networking", "--disable-component-update", "--disable-sync",
             f"--user-data-dir={tmp_path / 'profile'}", "--window-size=1200,900",
-            "--enable-logging=stderr", "--virtual-time-budget=3000", "--dump-dom",
+            "--enable-logging=stderr", "--virtual-time-budget=5000", "--dump-dom",
             probed.as_uri(),
         ],
         capture_output=True, text=True, timeout=60, check=True,
     )  # fmt: skip
     found = re.search(r'<p id="probe">(.*?)</p>', done.stdout)
     assert found is not None
-    assert found[1] == "2y|0.6|run/frame_2.exr|0|none|true"
+    assert found[1] == "true|2y|0.6|run/frame_2.exr|0|none|true"
     assert "CONSOLE" not in done.stderr
