@@ -94,8 +94,6 @@ def _pose(group: str, of: str, pose: PoseEstimate, units: str) -> list[Row]:
         Row(group, f"{of} translation {axis}", *interval(v, s), length, status, reason)
         for axis, v, s in zip("xyz", transform.t.tolist(), std[3:], strict=True)
     ]
-    if of == "projector":
-        out.append(Row(group, "baseline", f"{np.linalg.norm(transform.t):.5g}", "", length, status))
     return out
 
 
