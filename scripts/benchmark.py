@@ -7,7 +7,18 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from benchmarks import bundle_adjustment, emitter_cost, first_order, full_resolution, real_captures
+from benchmarks import (
+    bundle_adjustment,
+    emitter_cost,
+    first_order,
+    full_resolution,
+    joint,
+    placement,
+    real_captures,
+    robustness,
+    scaling,
+    shared_rig,
+)
 from benchmarks.report import Figure, save, show
 from rich.console import Console
 
@@ -15,7 +26,18 @@ from mitsuba_endo import backend
 
 BENCHMARKS = {
     module.NAME: module
-    for module in (bundle_adjustment, first_order, full_resolution, emitter_cost, real_captures)
+    for module in (
+        bundle_adjustment,
+        first_order,
+        full_resolution,
+        emitter_cost,
+        real_captures,
+        joint,
+        placement,
+        robustness,
+        scaling,
+        shared_rig,
+    )
 }
 
 

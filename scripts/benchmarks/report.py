@@ -39,7 +39,8 @@ class Figure:
     def reached(self) -> bool | None:
         if self.target is None:
             return None
-        return self.value <= self.target if self.better == "lower" else self.value >= self.target
+        low = self.better == "lower"
+        return bool(self.value <= self.target if low else self.value >= self.target)
 
 
 def timed(run: Callable[[], Result]) -> tuple[float, Result]:
