@@ -18,6 +18,7 @@ from benchmarks import (
     robustness,
     scaling,
     shared_rig,
+    verdicts,
 )
 from benchmarks.report import Figure, save, show
 from rich.console import Console
@@ -37,6 +38,7 @@ BENCHMARKS = {
         robustness,
         scaling,
         shared_rig,
+        verdicts,
     )
 }
 

@@ -33,7 +33,7 @@ class Frames:
     @property
     def baselines(self) -> NDArray[np.float64]:
         """(K,) mm."""
-        return np.array([np.linalg.norm(p.t) for p in self.projector_from_camera])
+        return np.array([float(np.linalg.norm(p.t)) for p in self.projector_from_camera])
 
 
 def make_frames(
