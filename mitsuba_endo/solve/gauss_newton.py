@@ -91,7 +91,7 @@ class GaussNewton:
         problem = self.objective.problem
         cost = self.objective.cost(self._now)
         size = np.inf
-        for _ in range(_TRIES):
+        for attempt in range(_TRIES):
             try:
                 surfaces, step = normal.solve(self._mu)
             except np.linalg.LinAlgError:
@@ -101,7 +101,8 @@ class GaussNewton:
             trial = evaluate(problem, apply_step(problem.plan, self._now.state, surfaces, step))
             if self.objective.cost(trial) <= cost:
                 self._now = trial
-                self._mu = max(self._mu / 10, _DAMPING_RANGE[0])
+                if attempt == 0:  # a damping that was only just enough is needed again
+                    self._mu = max(self._mu / 10, _DAMPING_RANGE[0])
                 return True, size
             if size < self.tolerance:
                 return False, size  # at the bottom, where rounding decides
