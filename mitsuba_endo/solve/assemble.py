@@ -114,6 +114,7 @@ def assemble(
         noise_px=fit.uncertainty.sigma,
         law_evidence=law_evidence or {},
         observability={
+            "before_optimising": describe(fit.foreseen),
             "free_directions": describe(report.directions),
             "correlation": correlation(report.covariance, report.names, report.plan),
         },

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut
+from .observability import Direction
 from .optimum import Optimum
 from .problem import Problem
 from .state import State
@@ -29,6 +30,8 @@ class Fit:
     """From the start: what the user should know."""
     timings: dict[str, float]
     """Seconds of every stage."""
+    foreseen: list[Direction]
+    """What the data were expected to leave free, before the optimisation."""
 
     @property
     def problem(self) -> Problem:

@@ -16,8 +16,10 @@ from ..start.result import Start
 from .agreement import agreements, worst
 from .drift import drift_prior
 from .fit import Fit
+from .foresight import foreseen_directions
 from .frames import common_start, solve_alone, usable_starts, without_faults, without_repeats
 from .joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
+from .observability import Direction
 from .optimum import Optimum
 from .options import Options
 from .plan import make_plan
@@ -45,6 +47,9 @@ class Job:
     resume: Checkpoint | None = None
     """Earlier calibration to go on with."""
     timings: dict[str, float] = field(default_factory=dict)
+    """Seconds of every stage, filled in while solving."""
+    foreseen: list[Direction] = field(default_factory=list)
+    """What the start of the last optimisation leaves free, likewise."""
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -181,6 +186,8 @@ def _optimise(
     job: Job, problem: Problem, state: State, report: OnIteration, stage: int = 0
 ) -> Optimum:
     """Optimise, with a surface that grows to where moving cameras look."""
+    with job.timed("observability"):
+        job.foreseen[:] = foreseen_directions(problem, state, job.options.finish)
     extra = drift_prior(job.rig, problem.plan)
     optimum = optimise(problem, state, job.options, extra, report, stage)
     for _ in range(_MAX_EXTENSIONS):
@@ -229,4 +236,5 @@ def _finish(
     with job.timed("uncertainty"):
         known = uncertainty(optimum, reported, job.options.jackknife)
     given = [m.name for m in job.maps]
-    return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings)
+    return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings,
+               job.foreseen)  # fmt: skip

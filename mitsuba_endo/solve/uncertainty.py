@@ -59,7 +59,7 @@ def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncerta
     variance, shrinkage = _noise(problem, optimum, loss, fitted)
     smooth = reported.normal.reduce()
     information = data_information(reported, smooth, variance)
-    S_inverse = _inverse(information)
+    S_inverse = inverse_information(information)
     formal = shrinkage * variance * S_inverse
     blocks = _block_contributions(problem, optimum, reduced) if jackknife else None
     return Uncertainty(
@@ -120,7 +120,7 @@ def _surface_variance(
     return factor.inverse().entries(n, n) + np.einsum("vi,vi->v", coupling @ S_inverse, coupling)
 
 
-def _inverse(S: NDArray[np.float64]) -> NDArray[np.float64]:
+def inverse_information(S: NDArray[np.float64]) -> NDArray[np.float64]:
     """Invert after scaling; directions without information get a huge variance, not infinity."""
     if not len(S):
         return S
