@@ -87,7 +87,7 @@ def worst(found: list[Agreement]) -> int | None:
 def _support(optimum: Optimum, frame: int) -> NDArray[np.float64]:
     """Return the robust weight (V,) of one frame's observations around every vertex."""
     size = optimum.objective.problem.surfaces[0].lattice.size
-    triangles = optimum.evaluation.linearisations[frame].triangles
+    triangles = optimum.evaluation.triangles[frame]
     total = np.bincount(triangles.ravel(), np.repeat(optimum.weights[frame], 3), size)
     return total.astype(np.float64)
 
@@ -95,8 +95,8 @@ def _support(optimum: Optimum, frame: int) -> NDArray[np.float64]:
 def _agreement(
     alone: FrameStart, optimum: Optimum, frame: int, others: NDArray[np.float64]
 ) -> Agreement:
-    lin = optimum.evaluation.linearisations[frame]
-    common = lin.hit & (others[lin.triangles] >= _SUPPORT).all(1)
+    at = optimum.evaluation
+    common = at.hits[frame] & (others[at.triangles[frame]] >= _SUPPORT).all(1)
     if not common.any():
         return Agreement(alone.name, 0.0, np.inf, 0.0)
     before, after = alone.optimum.evaluation.squared(0), optimum.evaluation.squared(frame)

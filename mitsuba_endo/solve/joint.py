@@ -127,7 +127,7 @@ MISSED_SHARE = 0.01
 
 
 def _missed_points(problem: Problem, optimum: Optimum, frame: int) -> NDArray[np.float64]:
-    hit = optimum.evaluation.linearisations[frame].hit
+    hit = optimum.evaluation.hits[frame]
     if hit.all():
         return np.zeros((0, 3))
     state = optimum.state

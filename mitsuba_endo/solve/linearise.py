@@ -29,9 +29,13 @@ class SurfaceScene:
         self.directions = _vector(lattice.directions)
         self.faces = [mi.UInt32(np.ascontiguousarray(lattice.faces[:, i])) for i in range(3)]
         self._mesh = MovingMesh(lattice.directions, lattice.faces)
+        self._placed: NDArray[np.float64] | None = None
 
     def move(self, rho: NDArray[np.float64]) -> None:
-        """Place the vertices at inverse ranges (V,)."""
+        """Place the vertices at inverse ranges (V,), unless these already hold."""
+        if rho is self._placed:
+            return
+        self._placed = rho
         self._mesh.move(self.lattice.vertices(rho))
 
     def cast(self, origin: Any, direction: Any) -> tuple[Any, Any]:

@@ -1,7 +1,7 @@
 """The robust cost that every solver minimises, and how its scale follows the data."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +25,40 @@ GlobalTerm = Callable[[State], tuple[NDArray[np.float64], NDArray[np.float64], f
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Residuals and derivatives at a state."""
+    """Residuals at a state, and on demand the derivatives."""
 
+    problem: Problem
     state: State
-    linearisations: list[Linearisation]
+    hits: list[NDArray[np.bool_]]
+    """(N,) pixels of every frame whose ray meets the surface."""
+    triangles: list[NDArray[np.int64]]
+    """(N, 3) vertices that each pixel sees."""
     residuals: list[NDArray[np.float64]]
     """(2, N) rendered minus observed, zero where missed."""
+    _only: list[Linearisation] = field(default_factory=list)
+
+    @property
+    def linearisations(self) -> Iterator[Linearisation]:
+        """Linearise frame after frame, so that memory holds the derivatives of one."""
+        return (self.linearisation(k) for k in range(len(self.hits)))
+
+    def linearisation(self, frame: int) -> Linearisation:
+        """Return the derivatives of one frame; those of an only frame are kept."""
+        if self._only:
+            return self._only[0]
+        plan = self.problem.plan
+        self.problem.move_surfaces(self.state)
+        lin = self.problem.renderers[frame].linearise(
+            self.state, frame, plan.surface_of(frame), plan.active(frame), plan.distortion_terms
+        )
+        if plan.frames == 1:
+            self._only.append(lin)
+        return lin
 
     def squared(self, frame: int) -> NDArray[np.float64]:
         """(N,) squared residuals of a frame, NaN where missed."""
         r2 = (self.residuals[frame] ** 2).sum(0)
-        return np.where(self.linearisations[frame].hit, r2, np.nan)
+        return np.where(self.hits[frame], r2, np.nan)
 
 
 @dataclass(eq=False)
@@ -122,7 +145,7 @@ class Objective:
         )
         for k, weight in enumerate(self.weights(at)):
             normal.add_frame(
-                plan.surface_of(k), at.linearisations[k], at.residuals[k], weight,
+                plan.surface_of(k), at.linearisation(k), at.residuals[k], weight,
                 plan.local_to_global(at.state, k),
             )  # fmt: skip
         self.add_priors(normal, at.state)
@@ -142,17 +165,15 @@ class Objective:
 
 
 def evaluate(problem: Problem, state: State) -> Evaluation:
-    """Render and linearise every frame at ``state``."""
+    """Render every frame at ``state``."""
     problem.move_surfaces(state)
-    plan = problem.plan
-    linearisations, residuals = [], []
+    at = Evaluation(problem, state, [], [], [])
     for k, (frame, renderer) in enumerate(zip(problem.frames, problem.renderers, strict=True)):
-        lin = renderer.linearise(
-            state, k, plan.surface_of(k), plan.active(k), plan.distortion_terms
-        )
-        linearisations.append(lin)
-        residuals.append(np.where(lin.hit, lin.q - frame.q, 0.0))
-    return Evaluation(state, linearisations, residuals)
+        q, _, triangles, hit = renderer.render(state, k, problem.plan.surface_of(k))
+        at.hits.append(hit)
+        at.triangles.append(triangles)
+        at.residuals.append(np.where(hit, q - frame.q, 0.0))
+    return at
 
 
 def estimate_noise(at: Evaluation) -> float:

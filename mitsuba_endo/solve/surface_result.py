@@ -27,10 +27,10 @@ def support(optimum: Optimum, surface: int) -> NDArray[np.float64]:
     """Return the robust weight (V,) of the observations around every vertex of a surface."""
     problem = optimum.objective.problem
     total = np.zeros(problem.surfaces[surface].lattice.size)
-    for k, lin in enumerate(optimum.evaluation.linearisations):
+    for k, triangles in enumerate(optimum.evaluation.triangles):
         if problem.plan.surface_of(k) == surface:
             weight = np.repeat(optimum.weights[k], 3)
-            total += np.bincount(lin.triangles.ravel(), weight, len(total))
+            total += np.bincount(triangles.ravel(), weight, len(total))
     return total
 
 
@@ -43,10 +43,11 @@ def seen_faces(optimum: Optimum, surface: int) -> NDArray[np.bool_]:
     lattice, rho = optimum.objective.problem.surfaces[surface].lattice, optimum.state.rho[surface]
     corners = lattice.faces
     weight, count = np.zeros(len(corners)), np.zeros(len(corners))
-    for k, lin in enumerate(optimum.evaluation.linearisations):
+    at = optimum.evaluation
+    for k, (triangles, hit) in enumerate(zip(at.triangles, at.hits, strict=True)):
         if optimum.objective.problem.plan.surface_of(k) == surface:
-            face = _face_index(lattice, lin.triangles[lin.hit])
-            weight += np.bincount(face, optimum.weights[k][lin.hit], len(corners))
+            face = _face_index(lattice, triangles[hit])
+            weight += np.bincount(face, optimum.weights[k][hit], len(corners))
             count += np.bincount(face, minlength=len(corners))
     range_ = 1 / rho[corners]
     steep = np.ptp(range_, axis=1) > _STEEP * lattice.cell * range_.mean(1)

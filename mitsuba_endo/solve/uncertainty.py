@@ -143,7 +143,7 @@ def _block_contributions(
     hessians, gradients, frames = [], [], []
     plan = problem.plan
     for k, frame in enumerate(problem.frames):
-        lin, r = optimum.evaluation.linearisations[k], optimum.evaluation.residuals[k]
+        lin, r = optimum.evaluation.linearisation(k), optimum.evaluation.residuals[k]
         root = np.sqrt(optimum.weights[k])
         X = reduced.eliminated[plan.surface_of(k)][:, :-1]
         chart = plan.local_to_global(optimum.state, k)

@@ -107,7 +107,7 @@ def _bound(problem: Problem, state: State) -> NDArray[np.float64]:
     """Return the Cramer-Rao bound (G,) for a lattice surface of which nothing is known."""
     plan, lattice = problem.plan, problem.surfaces[0].lattice
     normal = NormalEquations.empty([lattice.size], [lattice.bandwidth], plan.columns)
-    lin = evaluate(problem, state).linearisations[0]
+    lin = evaluate(problem, state).linearisation(0)
     normal.add_frame(
         0, lin, np.zeros_like(lin.q), np.ones(len(lin.hit)), plan.local_to_global(state, 0)
     )

@@ -105,7 +105,7 @@ class TestScale:
         objective = Objective(built, "tukey", sigma=0.3, stage=1)
         away = RigidTransform.of([0, 2.0, 0], [0.0, 0, 0])
         at = evaluate(built, state.with_(world_from_camera=[RigidTransform.identity(), away]))
-        assert not at.linearisations[1].hit.any()
+        assert not at.hits[1].any()
         assert objective.cost(at) > objective.cost(evaluate(built, state))
         assert objective.weights(at)[1].max() == 0
         missed = objective.cost(at) - objective.prior_cost(at.state)
