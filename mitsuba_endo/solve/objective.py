@@ -55,6 +55,10 @@ class Evaluation:
             self._only.append(lin)
         return lin
 
+    def forget(self) -> None:
+        """Give back the memory of kept derivatives; they are made again when asked for."""
+        self._only.clear()
+
     def squared(self, frame: int) -> NDArray[np.float64]:
         """(N,) squared residuals of a frame, NaN where missed."""
         r2 = (self.residuals[frame] ** 2).sum(0)

@@ -148,8 +148,8 @@ def _block_contributions(
         X = reduced.eliminated[plan.surface_of(k)][:, :-1]
         chart = plan.local_to_global(optimum.state, k)
         n = len(root)
-        J = (lin.J_local * root).transpose(0, 2, 1).reshape(2 * n, -1) @ chart
-        effective = J - surface_rows(lin, root, len(X)) @ X
+        local = (lin.J_local * root).transpose(0, 2, 1).reshape(2 * n, len(chart))
+        surface = surface_rows(lin, root, len(X))
         weighted = (r * root).ravel()
         block = image_blocks(frame.pixels, frame.shape)
         for b in np.unique(block):
@@ -157,9 +157,11 @@ def _block_contributions(
             if len(rows) < _SMALLEST_BLOCK:
                 continue
             rows = np.concatenate([rows, rows + n])
-            H = J[rows].T @ effective[rows]
+            # Products over pixels first: rows as wide as all unknowns would fill the memory.
+            L, Z, w = local[rows], surface[rows], weighted[rows]
+            H = chart.T @ ((L.T @ L) @ chart - (Z.T @ L).T @ X)
             hessians.append((H + H.T) / 2)
-            gradients.append(effective[rows].T @ weighted[rows])
+            gradients.append(chart.T @ (L.T @ w) - X.T @ (Z.T @ w))
             frames.append(k)
     return np.array(hessians), np.array(gradients), np.array(frames)
 
