@@ -147,5 +147,6 @@ def solve_alone(
         optimum = optimise(problem, state, options)
         if optimum.outcome is Outcome.INTERRUPTED:
             raise KeyboardInterrupt
+        optimum.evaluation.forget()
         out.append(FrameStart(map_.name, optimum))
     return out
