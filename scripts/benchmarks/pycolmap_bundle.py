@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pycolmap
+import pycolmap  # pyright: ignore[reportMissingImports]  the benchmark extra
 from numpy.typing import NDArray
 
 from .report import timed
