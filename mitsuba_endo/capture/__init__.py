@@ -1,0 +1,1 @@
+"""Simulated photographs: tissue, light, and what a camera does to an image."""

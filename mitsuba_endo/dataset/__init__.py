@@ -1,0 +1,1 @@
+"""Synthetic captures with truth, many at a time."""

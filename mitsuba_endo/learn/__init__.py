@@ -1,0 +1,1 @@
+"""Training of the decoder; the only room that knows PyTorch."""

@@ -1,0 +1,1 @@
+"""The live 3D viewer; the only room that knows viser."""
