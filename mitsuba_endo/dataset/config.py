@@ -1,0 +1,363 @@
+"""The configuration of a dataset: what scenes, cameras, projectors and photographs to draw."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import (
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from ..files import atomic_path
+from ..geometry.cameras import CAMERAS
+from ..geometry.laws import LAWS
+from ..records.validation import read_yaml, validate
+from ..shapes import SHAPES, parameter_names
+from .capture_ranges import CaptureRanges
+from .ranges import (
+    Anything,
+    Count,
+    Degrees,
+    Names,
+    NonNegative,
+    Number,
+    Positive,
+    Range,
+    Section,
+    Share,
+    choose,
+    fixed,
+    log,
+    uniform,
+)
+
+FILE = "file"
+LUMEN = "colon"
+Seed = Annotated[int, Field(ge=0)]
+
+DEFAULT_SCENES: list[dict[str, Any]] = [
+    {
+        "kind": "colon", "weight": 5, "polyps": {},
+        "parameters": {
+            "length": [110, 170], "radius": [15, 26], "bend": [0, 0.9],
+            "bend_towards": [-3.14159, 3.14159], "fold_depth": [3, 8.5], "fold_spacing": [14, 26],
+            "fold_width": [2.4, 4.0], "tenia_depth": [0.5, 2], "edge": 1.3,
+        },
+    },
+    {
+        "kind": "stomach", "weight": 3,
+        "parameters": {
+            "distance": [35, 75], "radius": [60, 90], "angle_x": 1.15, "angle_y": 1.15,
+            "fold_depth": [3, 7], "fold_spacing": [12, 22], "furrow_width": [3.5, 6],
+            "orientation": [-3.14159, 3.14159], "winding": [0.2, 0.7], "edge": 1.0,
+        },
+    },
+    {
+        "kind": "bumpy_sheet", "weight": 2,
+        "parameters": {
+            "distance": [35, 75], "width": 130, "height": 130, "radius": [100, 300],
+            "ripple_depth": [0.5, 4], "ripple_x": [4, 9], "ripple_y": [4, 9],
+            "dent_depth": [-6, 6], "dent_at_x": [-15, 15], "dent_at_y": [-15, 15],
+            "dent_spread": [30, 120], "edge": 0.8,
+        },
+    },
+    {
+        "kind": "concave_sphere",
+        "parameters": {
+            "distance": [30, 65], "radius": [40, 90], "angle_x": 1.2, "angle_y": 1.2, "edge": 0.8,
+        },
+    },
+    {
+        "kind": "rabbit",
+        "parameters": {"distance": [45, 75], "height": [45, 65], "yaw": [-3.14159, 3.14159]},
+    },
+]  # fmt: skip
+
+
+def _among(range_: Range, known: Any, what: str) -> Range:
+    for value in range_.values:
+        if value not in known:
+            raise ValueError(f"unknown {what} '{value}'; choose from {', '.join(known)}")
+    return range_
+
+
+class Polyps(Section):
+    """Polyps to raise from a colon's wall."""
+
+    count: Count = uniform(0, 3)
+    diameter: Positive = log(3.0, 12.0)
+    """Of the base circle, mm."""
+    flatness: Share = uniform(0.2, 0.5)
+    """Height by diameter, 0.1 to 0.5; one half is a hemisphere."""
+    ahead: Number = uniform(12.0, 60.0)
+    """Distance from the camera along the lumen, mm."""
+
+
+class View(Section):
+    """Where the camera stands before the surface."""
+
+    tilt: Degrees = uniform(0.0, 25.0)
+    """Angle of the optical axis with the straight view (the lumen's axis, the surface's normal)."""
+    turn: Degrees = uniform(-10.0, 10.0)
+    """Then, about the camera's own x and y axes: it looks beside the target."""
+    roll: Degrees = uniform(-180.0, 180.0)
+    """About the optical axis."""
+    distance: Positive = uniform(30.0, 80.0)
+    """From the surface, mm; for files seen from the front or outside. Shapes have their own."""
+    along: Share = uniform(0.05, 0.55)
+    """Place in a colon, as a share of its length."""
+    off_axis: Share = uniform(0.0, 0.4)
+    """Distance from the lumen's axis, as a share of its radius."""
+
+
+class Scene(Section):
+    """One kind of surface."""
+
+    kind: str
+    """Name of a shape, or ``file``."""
+    weight: PositiveFloat = 1.0
+    """How often it is drawn, relative to the others."""
+    parameters: dict[str, Anything] = {}
+    """Of the shape; those left out have its defaults, and a seed is drawn."""
+    polyps: Polyps | None = None
+    """In a colon; none means no polyps."""
+    file: str | None = None
+    """Mesh in any format that trimesh reads, or Mitsuba scene (.xml); beside the configuration."""
+    unit: Literal["mm", "cm", "m", "um"] = "mm"
+    """Of the file's lengths."""
+    side: Literal["front", "outside", "inside"] = "front"
+    """From where the file's surface is seen: the side its faces' normals point to, outside of a
+    solid, or inside of a lumen. The last two are found out, however the faces are wound."""
+    view: View = View()
+
+    @field_validator("kind")
+    @classmethod
+    def _known_kind(cls, value: str) -> str:
+        if value != FILE and value not in SHAPES:
+            names = ", ".join([*sorted(SHAPES), FILE])
+            raise ValueError(f"there is no kind '{value}'; choose one of {names}")
+        return value
+
+    @model_validator(mode="after")
+    def _fits_kind(self) -> "Scene":
+        if (self.kind == FILE) != (self.file is not None):
+            raise ValueError("kind 'file' and the key file go together; give both or neither")
+        if self.kind == FILE and self.parameters:
+            raise ValueError("a file has no parameters; remove them")
+        if self.polyps is not None and self.kind != LUMEN:
+            raise ValueError(f"a {self.kind} has no polyps; remove them")
+        if self.kind != FILE:
+            self._check_parameters()
+        return self
+
+    def _check_parameters(self) -> None:
+        """Build the shape's record, which checks its values, with each range's ends."""
+        unknown = sorted(set(self.parameters) - set(parameter_names(self.kind)))
+        if unknown:
+            known = ", ".join(parameter_names(self.kind))
+            raise ValueError(
+                f"parameters.{unknown[0]}: a {self.kind} has no such parameter; it has {known}"
+            )
+        if "polyps" in self.parameters:
+            raise ValueError("parameters.polyps: write polyps as a key of the scene")
+        for name, range_ in self.parameters.items():
+            for value in range_.values:
+                try:
+                    SHAPES[self.kind](**{name: value})
+                except ValidationError as error:
+                    first = error.errors()[0]
+                    # Without a place it is about several values, which are drawn together.
+                    if first["loc"]:
+                        raise ValueError(
+                            f"parameters.{name}: {first['msg'].lower()}, not {value!r}"
+                        ) from None
+
+
+def default_scenes() -> list[Scene]:
+    """Return folded tubes and stomach walls above all, and simpler surfaces besides."""
+    return [Scene.model_validate(scene) for scene in DEFAULT_SCENES]
+
+
+class Placing(Section):
+    """What a drawn view must fulfil; views that do not are drawn again."""
+
+    margin: PositiveFloat = 2.0
+    """Least distance of camera and projector from the surface, mm."""
+    least_lit: Annotated[float, Field(gt=0, le=1)] = 0.25
+    """Least share of the image's pixels that the projector lights."""
+    tries: PositiveInt = 200
+    """Views drawn before the sample is given up and recorded as failed."""
+
+
+class CameraRanges(Section):
+    """The camera."""
+
+    model: Names = fixed("opencv")
+    width: PositiveInt = 320
+    height: PositiveInt = 240
+    """Pixels, the same for all samples."""
+    fov: Degrees = uniform(65.0, 95.0)
+    """From left to right without distortion."""
+    aspect: Positive = uniform(0.995, 1.005)
+    """fy / fx."""
+    centre: Number = uniform(-5.0, 5.0)
+    """Principal point from the image's middle along each axis, pixels."""
+    distortion: list[Number] = [
+        uniform(-0.2, 0.0), uniform(0.0, 0.03),
+        uniform(-0.001, 0.001), uniform(-0.001, 0.001),
+    ]  # fmt: skip
+    """Coefficients in the model's OpenCV order."""
+
+    @field_validator("model")
+    @classmethod
+    def _known_model(cls, value: Range) -> Range:
+        return _among(value, CAMERAS, "camera model")
+
+    @field_validator("fov")
+    @classmethod
+    def _sensible_fov(cls, value: Range) -> Range:
+        if min(value.values) < 5 or max(value.values) > 170:
+            raise ValueError("is out of range; stay within 5 and 170 degrees")
+        return value
+
+    @model_validator(mode="after")
+    def _coefficients(self) -> "CameraRanges":
+        for model in self.model.values:
+            if len(self.distortion) not in CAMERAS[model].max_coefficients:
+                allowed = ", ".join(map(str, CAMERAS[model].max_coefficients))
+                raise ValueError(
+                    f"{len(self.distortion)} distortion coefficients do not fit model {model}; "
+                    f"give one of {allowed}"
+                )
+        return self
+
+
+class ProjectorRanges(Section):
+    """The pattern projector in the endoscope's channel."""
+
+    law: Names = choose("direction_cosine", "pinhole")
+    focal: Positive = uniform(260.0, 380.0)
+    """Pattern pixels."""
+    centre: Number = uniform(-3.0, 3.0)
+    """Principal point from the pattern's middle along each axis, pattern pixels."""
+    aspect: Positive = fixed(1.0)
+    """fy / fx."""
+    distortion: list[Number] = []
+    """k1, k2, p1, p2, k3 on the law's normalised coordinates."""
+    baseline: Positive = uniform(3.5, 8.0)
+    """Distance of the channel's axis from the camera's, mm."""
+    bearing: Degrees = uniform(-180.0, 180.0)
+    """Direction of the channel from the camera, from +x towards +y."""
+    ahead: Number = uniform(-1.0, 4.0)
+    """How far the projector is pushed beyond the camera, mm."""
+    meeting: Positive = log(40.0, 400.0)
+    """Distance at which the projector's axis would meet the camera's, mm, before ``tilt``."""
+    tilt: Degrees = uniform(-4.0, 4.0)
+    """Error of the axis' direction about the projector's x and y axes."""
+    roll: Degrees = uniform(-25.0, 25.0)
+    """About its own axis."""
+
+    @field_validator("law")
+    @classmethod
+    def _known_law(cls, value: Range) -> Range:
+        return _among(value, LAWS, "projector law")
+
+    @field_validator("distortion")
+    @classmethod
+    def _few(cls, value: list[Range]) -> list[Range]:
+        if len(value) > 5:
+            raise ValueError(f"{len(value)} coefficients; give k1, k2, p1, p2, k3 at most")
+        return value
+
+
+class PatternRanges(Section):
+    """The coded grid: ranges of the parameters of :class:`~mitsuba_endo.decode.CodedGrid`."""
+
+    variants: PositiveInt = 16
+    """Different patterns in the dataset; each is drawn once and used by many samples."""
+    width: Annotated[int, Field(ge=2, le=8192)] = 480
+    """Pattern pixels."""
+    height: Annotated[int, Field(ge=2, le=8192)] = 384
+    columns: Count = fixed(32)
+    rows: Count = fixed(32)
+    period: Positive = fixed(12.0)
+    """Pattern pixels."""
+    line: Positive = uniform(0.05, 0.075)
+    """Standard deviation of a line's profile, periods."""
+    step: Positive = uniform(0.26, 0.3)
+    """Height of a code's step, periods."""
+    codes: Count = uniform(0, 999_999)
+    """Seeds of the code sequence. Keep test sets apart from training sets by other codes."""
+    background: Share = uniform(0.01, 0.06)
+    """Stray light between the lines, relative to them."""
+    zero_order: NonNegative = uniform(0.0, 2.0)
+    """Brightness of the undiffracted beam, relative to the lines."""
+    zero_order_size: Positive = uniform(1.5, 4.0)
+    """Its standard deviation, pattern pixels."""
+    colour: Names = fixed("green")
+    oversample: Annotated[int, Field(ge=1, le=8)] = 2
+    """Texels per pattern pixel."""
+
+
+class Store(Section):
+    """What is kept of each sample besides image and maps."""
+
+    radiance: bool = True
+    """The noise-free linear image, float16."""
+    surface: bool = True
+    """The mesh, with which a calibrated surface is compared."""
+
+
+class Config(Section):
+    """Contents of a dataset's configuration file. Everything has a default."""
+
+    seed: Seed = 0
+    """With the sample's number it decides everything about the sample."""
+    format: Literal["files", "hdf5"] = "files"
+    """A folder of files a sample, for people; or HDF5 shards, for training."""
+    shard: Annotated[int, Field(ge=1, le=100_000)] = 100
+    """Samples in an HDF5 shard."""
+    store: Store = Store()
+    scenes: Annotated[list[Scene], Field(min_length=1)] = Field(default_factory=default_scenes)
+    placing: Placing = Placing()
+    camera: CameraRanges = CameraRanges()
+    projector: ProjectorRanges = ProjectorRanges()
+    pattern: PatternRanges = PatternRanges()
+    capture: CaptureRanges = CaptureRanges()
+
+
+def load_config(path: str | Path | None) -> Config:
+    """Read a configuration file; None gives the built-in one. Scene files are found beside it.
+
+    Raises:
+        InputError: names the file and field.
+    """
+    if path is None:
+        return Config()
+    path = Path(path)
+    config = validate(Config, read_yaml(path), path.name)
+    scenes = [
+        scene
+        if scene.file is None
+        else scene.model_copy(update={"file": str((path.parent / scene.file).absolute())})
+        for scene in config.scenes
+    ]
+    return config.model_copy(update={"scenes": scenes})
+
+
+def save_config(path: str | Path, config: Config) -> None:
+    """Write a configuration with every default spelt out.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    text = yaml.safe_dump(
+        config.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=100
+    )
+    with atomic_path(path) as aside:
+        aside.write_text(text, encoding="utf-8")
