@@ -112,6 +112,28 @@ class Frame(Record):
     """Correspondences found to be off by whole pattern periods."""
 
 
+class Alternative(Record):
+    """Another projector pose that explains the correspondences of some frames about as well."""
+
+    frames: list[str]
+    """Names of the frames that have this pose."""
+    R: Matrix3
+    t: Vector3
+    """Projector from camera, the baseline taken to be as long as the solution's."""
+    focal: float
+    """Pattern pixels."""
+    cost_ratio: float
+    """Robust cost of the epipolar residuals over that of the solution; below 1 it fits better."""
+    decided: bool
+    """Whether the residuals prefer the solution by more than noise can make."""
+    reason: str
+    """What it is and what would rule it out, in words."""
+
+    def to_transform(self) -> RigidTransform:
+        """Return the pose."""
+        return RigidTransform.of(self.R, self.t)
+
+
 class LeftOut(Record):
     """A frame that is not part of the solution."""
 
@@ -140,6 +162,8 @@ class Solution(Record):
     projector: ProjectorEstimate
     frames: list[Frame] = Field(min_length=1)
     left_out: list[LeftOut] = []
+    alternatives: list[Alternative] = []
+    """Poses that the data hardly tell from the solution's: the planar twin, above all."""
     surface: str | None = None
     """File name of the surface beside this file, in the first camera's frame."""
     noise_px: float | None = None

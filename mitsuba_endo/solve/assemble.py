@@ -13,6 +13,7 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration
 from ..records.rig import Camera, Rig
 from ..records.solution import (
+    Alternative,
     Estimate,
     Frame,
     Outcome,
@@ -21,6 +22,8 @@ from ..records.solution import (
     Solution,
     Status,
 )
+from ..start.rivals import Rival
+from .ambiguity import AMBIGUOUS, alternative, ambiguities
 from .fit import Fit
 from .observability import (
     Direction,
@@ -55,10 +58,16 @@ class Report:
     names: list[Unknown]
     directions: list[Direction]
     flat: bool
+    rivals: list[tuple[list[int], Rival]]
+    """Other projector poses that fit, with their frames."""
 
     @property
     def plan(self) -> Plan:
         return self.fit.problem.plan
+
+    def ambiguous(self, frame: int) -> bool:
+        """Tell whether the residuals cannot choose between this frame's pose and another."""
+        return any(frame in frames and not rival.decided for frames, rival in self.rivals)
 
     def reason(self, block: str, frame: int) -> str | None:
         """Say why a block is not measured, and what would help."""
@@ -110,6 +119,7 @@ def assemble(
         projector=_projector(report, rig),
         frames=[_frame(report, k, slips[k]) for k in range(len(fit.maps))],
         left_out=fit.left_out,
+        alternatives=_alternatives(report),
         surface="surface.ply",
         noise_px=fit.uncertainty.sigma,
         law_evidence=law_evidence or {},
@@ -140,10 +150,29 @@ def _report(fit: Fit, unit: Unit) -> Report:
     covariance = _larger(fit)
     rho = fit.state.rho[0]
     points = fit.problem.surfaces[0].lattice.vertices(rho)
+    determined = [
+        _worst(covariance, names, fit.problem.plan.slot("projector_pose", k)) != "unobservable"
+        and _worst(covariance, names, fit.problem.plan.slot("focal", k)) != "unobservable"
+        for k in range(len(fit.maps))
+    ]
     return Report(
         fit, unit, covariance, names,
         free_directions(covariance, names, fit.problem.plan), is_flat(points),
+        ambiguities(fit, covariance, determined),
     )  # fmt: skip
+
+
+def _alternatives(report: Report) -> list[Alternative]:
+    fit = report.fit
+    return [
+        alternative(
+            rival,
+            [fit.maps[k].name for k in frames],
+            report.unit.pose(fit.state.projector_from_camera[frames[0]]),
+            float(_values(report, "focal", frames[0])[0]),
+        )
+        for frames, rival in report.rivals
+    ]
 
 
 def _variances(fit: Fit) -> list[NDArray[np.float64]]:
@@ -193,7 +222,7 @@ def _intrinsic(report: Report, block: str, frame: int) -> Estimate:
         return Estimate(value=_plain(values, block), status="fixed")
     scale = values if block in ("focal", "aspect") else np.ones(len(values))
     formal, jackknife, largest = _deviations(report, slot, scale)
-    worst = _worst(report, range(slot.start, slot.stop))
+    worst = _worst(report.covariance, report.names, slot)
     return Estimate(
         value=None if worst == "unobservable" else _plain(values, block),
         std=_plain(largest, block),
@@ -229,9 +258,12 @@ def _deviations(
     return formal, jackknife, np.sqrt(np.diag(report.covariance)[slot]) * scale
 
 
-def _worst(report: Report, columns: range) -> Status:
-    deviations = np.sqrt(np.diag(report.covariance))
-    return status_of(max(float(deviations[i]) / report.names[i].scale for i in columns))
+def _worst(covariance: NDArray[np.float64], names: list[Unknown], slot: slice | None) -> Status:
+    """Return the status of a block, that of its least known unknown."""
+    if slot is None:
+        return "fixed"
+    deviations = np.sqrt(np.diag(covariance))[slot]
+    return status_of(max(float(d) / n.scale for d, n in zip(deviations, names[slot], strict=True)))
 
 
 def _frame(report: Report, k: int, slips: int | None) -> Frame:
@@ -260,9 +292,12 @@ def _pose(report: Report, block: str, frame: int, pose: RigidTransform) -> PoseE
     slot = report.plan.slot(block, frame)
     if slot is None:
         return PoseEstimate.of(pose, std=[0.0] * 6, status="fixed")
-    status = _worst(report, range(slot.start, slot.stop))
+    status = _worst(report.covariance, report.names, slot)
+    reason = None if status == "measured" else report.reason(block, frame)
     if status == "unobservable":
-        return PoseEstimate(R=None, t=None, status=status, reason=report.reason(block, frame))
+        return PoseEstimate(R=None, t=None, status=status, reason=reason)
+    if block == "projector_pose" and report.ambiguous(frame):
+        status, reason = "weak", f"{AMBIGUOUS}; {reason}" if reason else AMBIGUOUS
     known = report.fit.uncertainty
     jackknives = [c for c in (known.jackknife, known.frame_jackknife) if c is not None]
     candidates = [_pose_std(report, block, frame, c) for c in jackknives]
@@ -272,7 +307,7 @@ def _pose(report: Report, block: str, frame: int, pose: RigidTransform) -> PoseE
         std_formal=_pose_std(report, block, frame, known.formal),
         std_jackknife=[float(x) for x in np.max(candidates, axis=0)] if candidates else None,
         status=status,
-        reason=None if status == "measured" else report.reason(block, frame),
+        reason=reason,
     )
 
 

@@ -1,6 +1,6 @@
 """The verdict: what was measured and what was not, in sentences."""
 
-from ..records.solution import Estimate, PoseEstimate, Solution
+from ..records.solution import Alternative, Estimate, PoseEstimate, Solution
 
 _INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
@@ -20,7 +20,13 @@ def verdict(solution: Solution) -> list[str]:
             out += _pose(named, frame.projector_from_camera, unit)
         if frame.world_from_camera.status != "fixed":
             out += _pose(f"Camera pose{where}", frame.world_from_camera, unit)
-    return out
+    return out + [_alternative(solution, a) for a in solution.alternatives]
+
+
+def _alternative(solution: Solution, other: Alternative) -> str:
+    every = len(other.frames) == len(solution.frames)
+    where = "" if every else f" of {', '.join(other.frames)}"
+    return f"Alternative projector pose{where}: {other.reason}."
 
 
 def _scale(solution: Solution) -> str:

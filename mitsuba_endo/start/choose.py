@@ -12,6 +12,7 @@ from .correspondences import Correspondences
 from .propose import facing, planar_poses, same_pose
 from .refine import Loss, State, evaluate, minimise
 from .result import Candidate
+from .vectors import Vectors
 
 GRADUATED_PX = (20.0, 5.0, 1.0)
 """Cauchy scales, coarse to fine: a wide one bridges wrong starts, a narrow one ignores outliers."""
@@ -55,6 +56,10 @@ class Minimum:
         return Candidate(
             self.state.pose, float(self.state.projector.focal), self.cost, self.in_front
         )
+
+    def same_as(self, other: "Minimum") -> bool:
+        """Tell whether pose (0.01 radians) and focal length (2 %) are the same."""
+        return _same(self.state, other.state)
 
 
 def robust_scale(state: State) -> float:
@@ -152,8 +157,8 @@ def _without_repeats(states: list[State]) -> list[State]:
 def ranked(minima: list[Minimum]) -> list[Minimum]:
     """Return the distinct minima by cost under one Geman-McClure loss, that of the best scale.
 
-    Costs that noise alone could put in either order (a chi-square difference below 9) are a tie;
-    among those the smaller rotation comes first, since projectors look where their cameras do.
+    Costs that noise alone could put in either order are a tie (see :func:`cost_margin`); among
+    those the smaller rotation comes first, since projectors look where their cameras do.
     """
     if not minima:
         return []
@@ -165,11 +170,33 @@ def ranked(minima: list[Minimum]) -> list[Minimum]:
     )
     distinct = _without_repeats([m.state for m in rated])
     kept = [m for m in rated if any(m.state is s for s in distinct)]
-    tie = kept[0].cost + 4.5 / kept[0].state.r.size
+    best = kept[0]
+    tied = {
+        id(m)
+        for m in kept
+        if m.cost <= best.cost + cost_margin(best.state.r, m.state.r, loss) / scale**2
+    }
     return sorted(
         kept,
-        key=lambda m: (m.cost > tie, rotation_angle(m.state.pose.R) if m.cost <= tie else m.cost),
-    )
+        key=lambda m: (id(m) not in tied, rotation_angle(m.state.pose.R) if id(m) in tied
+                       else m.cost),
+    )  # fmt: skip
+
+
+def cost_margin(a: Vectors, b: Vectors, loss: Loss) -> float:
+    """Return the difference of mean loss that noise alone makes between two calibrations.
+
+    Each feels the noise across its own epipolar lines, so even two exact poses differ by the
+    standard error of the pointwise differences; three of them count (Vuong 1989). Calibrations
+    in one valley feel the same noise: there a chi-square difference of 9 counts.
+
+    Args:
+        a: (N,) residuals of one calibration, pattern pixels.
+        b: (N,) of the other, at the same correspondences.
+    """
+    difference = loss.values(b) - loss.values(a)
+    sigma2 = (loss.scale / REDESCENDING) ** 2
+    return max(3 * float(difference.std()) / np.sqrt(len(a)), 4.5 * sigma2 / len(a))
 
 
 def _descend(problem: Problem, state: State, data: Correspondences, loss: Loss) -> State:

@@ -32,9 +32,12 @@ class Loss:
 
     def cost(self, r: Vectors) -> float:
         """Return the mean loss, pattern pixels squared."""
+        return float(self.values(r).mean())
+
+    def values(self, r: Vectors) -> Vectors:
+        """Return the loss of every residual, pattern pixels squared."""
         s = (r / self.scale) ** 2
-        value = s / (1 + s) if self.redescending else np.log1p(s)
-        return float(0.5 * self.scale**2 * value.mean())
+        return 0.5 * self.scale**2 * (s / (1 + s) if self.redescending else np.log1p(s))
 
     def weight(self, r: Vectors) -> Vectors:
         """Return rho'(r) / r, the weight of iteratively reweighted least squares."""

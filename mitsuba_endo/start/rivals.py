@@ -1,0 +1,107 @@
+"""Other calibrations that explain the correspondences about as well as a given one.
+
+Two poses explain a plane exactly: its homography R + t n^T / distance splits in two ways (Faugeras
+and Lustman 1988). Depth rejects one of them unless both put the plane in front of both devices.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.transforms import RigidTransform
+
+from .choose import (
+    REDESCENDING,
+    SIMILAR_COST,
+    Minimum,
+    Problem,
+    cost_margin,
+    refine,
+    robust_scale,
+)
+from .correspondences import Correspondences, spread_sample
+from .notes import is_planar
+from .propose import distinct, propose
+from .refine import Loss, evaluate, minimise
+
+SAMPLE = 4000
+"""Correspondences that are looked at; twins differ in all of them."""
+_PROPOSALS = 4
+_FOCAL_FACTOR = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another minimum of the epipolar cost."""
+
+    projector_from_camera: RigidTransform
+    """|t| = 1."""
+    focal: float
+    """Pattern pixels."""
+    cost_ratio: float
+    """Robust epipolar cost over that of the given calibration, both at their minima."""
+    decided: bool
+    """Whether the residuals prefer the given calibration by more than noise can make."""
+    planar: bool
+    """Whether the surface is nearly one plane under the given calibration."""
+
+
+def rivals(
+    data: Correspondences,
+    projector: ProjectorModel,
+    pose: RigidTransform,
+    *,
+    refine_focal: bool,
+    noise_px: float,
+    width: int,
+    seed: int = 0,
+) -> list[Rival]:
+    """Return the rivals of a calibration, best first; most scenes have none.
+
+    Args:
+        data: correspondences that were used.
+        projector: of the calibration.
+        pose: projector_from_camera, any unit of length.
+        refine_focal: whether a rival may have another focal length.
+        noise_px: standard deviation of one component of q, pattern pixels.
+        width: of the map, pixels.
+        seed: of the sample drawn.
+    """
+    rng = np.random.default_rng(seed)
+    some = spread_sample(data, SAMPLE, width, rng)
+    few = spread_sample(some, SAMPLE // 8, width, rng)
+    focal = float(projector.focal)
+    bounds = (focal / _FOCAL_FACTOR, focal * _FOCAL_FACTOR)
+    problem = Problem(projector, refine_focal, bounds, noise_px)
+    unit = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
+    found = distinct(propose(few, projector, np.array([focal])), _PROPOSALS)
+    starts = [(unit, focal), *((p.pose, p.focal) for p in found)]
+    return _rated(problem, unit, refine(problem, starts, some), some)
+
+
+def _rated(
+    problem: Problem,
+    pose: RigidTransform,
+    minima: list[Minimum],
+    data: Correspondences,
+) -> list[Rival]:
+    """Compare the minima with the given calibration under one loss; drop itself and worse ones."""
+    given = evaluate(pose, problem.projector, data)
+    scale = robust_scale(given)
+    loss = Loss(True, REDESCENDING * scale)
+    given = minimise(
+        given, data, loss, refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds
+    )
+    lowest = loss.cost(given.r)
+    planar = is_planar(given, data)
+    itself = Minimum(given, 1.0)
+    out = []
+    for m in minima:
+        cost = loss.cost(m.state.r)
+        decided = cost - lowest > cost_margin(given.r, m.state.r, loss)
+        if m.same_as(itself) or (decided and cost > SIMILAR_COST * lowest):
+            continue
+        found = m.candidate
+        out.append(Rival(found.projector_from_camera, found.focal, cost / lowest, decided, planar))
+    return sorted(out, key=lambda r: r.cost_ratio)
