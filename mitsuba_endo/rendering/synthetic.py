@@ -23,6 +23,18 @@ class Correspondences:
     """(H, W, 3) points seen, in the camera's frame; NaN where there is none."""
 
 
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Where N rays meet a mesh."""
+
+    points: NDArray[np.float64]
+    """(N, 3) in the world, computed in double precision; meaningless without a hit."""
+    triangle: NDArray[np.int64]
+    """(N,) index of the face; 0 without a hit."""
+    hit: NDArray[np.bool_]
+    """(N,)."""
+
+
 class MeshScene:
     """A mesh in the world, of which views give correspondences."""
 
@@ -48,12 +60,13 @@ class MeshScene:
             size: pattern (width, height); coordinates outside are missing. None: no limit.
         """
         rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
-        points, hit = self._first_hit(world_from_camera.t, world_from_camera.rotate(rays))
+        seen = self.cast(world_from_camera.t, world_from_camera.rotate(rays))
+        points, hit = seen.points, seen.hit
         camera_from_world = world_from_camera.inverse()
         world_from_projector = world_from_camera @ projector_from_camera.inverse()
         at = camera_from_world.apply(points)
         q = projector.project(projector_from_camera.apply(at))
-        lit = hit & np.isfinite(q).all(1) & self._lit(world_from_projector.t, points)
+        lit = hit & np.isfinite(q).all(1) & self.reaches(world_from_projector.t, points)
         if size is not None:
             lit &= ((q >= -0.5) & (q <= np.array(size) - 0.5)).all(1)
         shape = (camera.height, camera.width)
@@ -62,25 +75,28 @@ class MeshScene:
             np.where(hit[:, None], at, np.nan).reshape(*shape, 3),
         )
 
-    def _first_hit(
-        self, origin: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the points (N, 3), in double precision, where rays meet the mesh, and which do."""
+    def cast(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
+        """Follow rays from an origin (3,), or one for each (N, 3), along directions (N, 3)."""
         triangle, hit = self._mesh.cast(_vector(np.broadcast_to(origin, directions.shape)),
                                         _vector(directions))  # fmt: skip
-        a, b, c = (self._vertices[self._faces[triangle.numpy(), i]] for i in range(3))
+        index = triangle.numpy().astype(np.int64)
+        a, b, c = (self._vertices[self._faces[index, i]] for i in range(3))
         normal = np.cross(b - a, c - a)
         along = np.einsum("ni,ni->n", normal, directions)
         distance = np.einsum("ni,ni->n", normal, a - origin) / np.where(along == 0, np.nan, along)
-        return origin + distance[:, None] * directions, hit.numpy() & np.isfinite(distance)
+        return Hits(
+            origin + distance[:, None] * directions, index, hit.numpy() & np.isfinite(distance)
+        )
 
-    def _lit(self, origin: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell which points (N, 3) are seen from ``origin``."""
+    def reaches(
+        self, origin: NDArray[np.float64], points: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """Tell which points (N, 3) of the mesh are seen from ``origin`` (3,)."""
         way = np.nan_to_num(points - origin, nan=1.0)
         distance = np.linalg.norm(way, axis=1)
-        found, hit = self._first_hit(origin, way / distance[:, None])
-        reached = np.linalg.norm(np.nan_to_num(found) - origin, axis=1)
-        return ~hit | (reached > distance * (1 - 1e-3))
+        met = self.cast(origin, way / distance[:, None])
+        reached = np.linalg.norm(np.nan_to_num(met.points) - origin, axis=1)
+        return ~met.hit | (reached > distance * (1 - 1e-3))
 
 
 def _vector(values: NDArray[np.float64]) -> Any:
