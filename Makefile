@@ -6,7 +6,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/.stamps
 
-.PHONY: help demo test test-slow lint format benchmark clean
+.PHONY: help demo test test-slow lint format docs benchmark clean
 
 help:
 	@echo "make demo       install into $(VENV) and calibrate a synthetic endoscope (demo-output/)"
@@ -14,6 +14,7 @@ help:
 	@echo "make test-slow  run the experiments of minutes too"
 	@echo "make lint       ruff and pyright"
 	@echo "make format     let ruff mend the layout"
+	@echo "make docs       build the documentation (site/)"
 	@echo "make benchmark  compare with pycolmap and the published solver (benchmark-output/)"
 
 demo: $(STAMPS)/core
@@ -34,11 +35,14 @@ format: $(STAMPS)/lint
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+docs: $(STAMPS)/docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --site-dir site
+
 benchmark: $(STAMPS)/benchmark
 	$(BIN)/python scripts/benchmark.py --out benchmark-output
 
 clean:
-	rm -rf $(VENV) build *.egg-info demo-output benchmark-output
+	rm -rf $(VENV) build *.egg-info demo-output benchmark-output site
 
 $(STAMPS)/venv:
 	$(PYTHON) -m venv $(VENV)
@@ -49,6 +53,6 @@ $(STAMPS)/core: $(STAMPS)/venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable .
 	touch $@
 
-$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/benchmark: $(STAMPS)/%: $(STAMPS)/core
+$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/docs $(STAMPS)/benchmark: $(STAMPS)/%: $(STAMPS)/core
 	$(BIN)/python -m pip install --quiet --editable ".[$*]"
 	touch $@

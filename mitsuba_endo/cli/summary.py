@@ -29,6 +29,8 @@ _ROUNDING = 1e-12
 
 def solution_table(solution: "Solution") -> "Table":
     """List the unknowns with their units; poses axis by axis for one frame, else a row a frame."""
+    from rich.text import Text
+
     table = _table("Calibration", "Quantity", "Value", "± std", "Unit", "Status")
     projector = solution.projector
     for name, unit in (
@@ -37,7 +39,7 @@ def solution_table(solution: "Solution") -> "Table":
         _estimate_rows(table, name, getattr(projector, name), unit)
     for frame in solution.frames:
         table.add_section()
-        table.add_row(f"[bold]{frame.name}[/]", "", "", "", "")
+        table.add_row(Text(frame.name, style="bold"), "", "", "", "")
         if frame.focal is not None:
             _estimate_rows(table, "focal", frame.focal, "pattern px")
         _pose_rows(table, frame.projector_from_camera, solution.units, len(solution.frames) > 1)
@@ -46,7 +48,7 @@ def solution_table(solution: "Solution") -> "Table":
             table.add_row("residual RMS", f"{frame.rms_px:.3f}", "", "pattern px", used)
     for left in solution.left_out:
         table.add_section()
-        table.add_row(f"[bold]{left.name}[/]", "left out", "", "", "")
+        table.add_row(Text(left.name, style="bold"), "left out", "", "", "")
     return table
 
 
