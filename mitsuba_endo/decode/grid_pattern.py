@@ -75,8 +75,11 @@ class CodedGrid:
     @property
     def nodes(self) -> NDArray[np.float64]:
         """(rows, columns, 2) pattern pixels of the nodes."""
-        grid = np.meshgrid(np.arange(self.columns), np.arange(self.rows))
-        return (np.stack(grid, -1) - self._middle) * self.period + self._centre
+        return self.pixels(np.stack(np.meshgrid(np.arange(self.columns), np.arange(self.rows)), -1))
+
+    def pixels(self, lattice: NDArray[np.floating] | NDArray[np.integer]) -> NDArray[np.float64]:
+        """Return the pattern pixels (..., 2) of continuous columns and rows (..., 2)."""
+        return (lattice - self._middle) * self.period + self._centre
 
     def truth(self, q: NDArray[np.floating]) -> GridTruth:
         """Return what the pattern means at ``q`` (..., 2), pattern pixels (x, y)."""

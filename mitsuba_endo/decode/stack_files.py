@@ -6,17 +6,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import atomic_folder
+from .image_files import full_scale, images_of, read_image
 from .plan import StackPlan
 from .stack import Stack, patterns
 
-SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
 _LABEL = re.compile(r"(?:[xy]_(?:gray\d+(?:_inverse)?|phase[\d.]+_step\d+)|white|black)$")
-DEPTHS = (8, 10, 12, 14, 16)
-"""Bits of common sensors: 16-bit files often hold fewer."""
 
 
 def save_patterns(folder: str | Path, plan: StackPlan) -> list[str]:
@@ -44,19 +41,11 @@ def stack_paths(given: Sequence[str | Path]) -> list[Path]:
     """
     paths = [Path(p) for p in given]
     if len(paths) == 1 and paths[0].is_dir():
-        inside = [p for p in paths[0].iterdir() if p.suffix.lower() in SUFFIXES]
-        if not inside:
-            raise InputError("holds no image", str(paths[0]), f"put {', '.join(SUFFIXES)} there")
-        return sorted(inside, key=_natural)
+        return images_of(paths[0])
     for path in paths:
         if not path.is_file():
             raise InputError("no such image", str(path), "give image files or one folder")
     return paths
-
-
-def _natural(path: Path) -> list[tuple[int, str]]:
-    parts = re.split(r"(\d+)", path.name.lower())
-    return [(int(p), "") if p.isdigit() else (-1, p) for p in parts if p]
 
 
 def check_names(paths: Sequence[Path], plan: StackPlan) -> None:
@@ -100,7 +89,7 @@ def load_stack(paths: Sequence[str | Path]) -> Stack:
     Raises:
         InputError: an image is missing, damaged, of another kind or of another size.
     """
-    raw = [_read(Path(path)) for path in paths]
+    raw = [read_image(Path(path)) for path in paths]
     first = raw[0]
     for path, image in zip(paths, raw, strict=True):
         if image.shape[:2] != first.shape[:2]:
@@ -113,26 +102,9 @@ def load_stack(paths: Sequence[str | Path]) -> Stack:
             raise InputError(
                 f"is {image.dtype}, the first image {first.dtype}", str(path), "give one kind"
             )
-    brightest = max(int(image.max()) for image in raw)
-    wide = first.dtype == np.uint16
-    bits = next(b for b in (DEPTHS[1:] if wide else DEPTHS) if brightest < 2**b)
-    levels = 2**bits - 1
+    levels = full_scale(*raw)
     return Stack(
         images=np.stack([image.mean(-1, dtype=np.float32) / levels for image in raw]),
         saturated=np.stack([(image >= levels).any(-1) for image in raw]),
         levels=levels,
     )
-
-
-def _read(path: Path) -> NDArray[np.integer]:
-    """Read (H, W, C); an alpha channel is left out."""
-    if not path.is_file():
-        raise InputError("no such image", str(path), "check the path")
-    # Decoding from memory: OpenCV's own reader prints to stderr about damaged files.
-    image = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise InputError("is not a readable image", str(path), "make it again")
-    if image.dtype not in (np.uint8, np.uint16):
-        raise InputError(f"is {image.dtype}", str(path), "give 8- or 16-bit images")
-    pixels: NDArray[np.integer] = np.asarray(image)  # pyright: ignore[reportAssignmentType]
-    return pixels[..., None] if pixels.ndim == 2 else pixels[..., :3]

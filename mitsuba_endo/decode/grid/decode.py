@@ -1,0 +1,89 @@
+"""From an image of the coded grid to projector coordinates."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..agreement import agreeing
+from ..grid_pattern import CodedGrid
+from ..normalise import one_channel
+from .graph import GridGraph, build_graph
+from .heads import Heads
+from .identify import Identity, identify
+from .network import Network
+from .nodes import larger
+from .unwrap import unwrap
+
+FEW_NODES = 9
+"""With fewer, an image shows no grid."""
+DARK = 8 / 255
+"""An image whose brightest hundredth is below that is called dark."""
+SATURATED = 254.5 / 255
+
+
+@dataclass(frozen=True, eq=False)
+class DecodedGrid:
+    """What one image says."""
+
+    q: NDArray[np.float32]
+    """(H, W, 2) pattern pixels (x, y), integer = pixel centre, NaN = not known."""
+    confidence: NDArray[np.float32]
+    """(H, W) probability that the coordinate is right to a tenth of a period, 0 = not known."""
+    graph: GridGraph
+    identity: Identity
+    reason: str
+    """Why nothing was decoded; empty if something was."""
+
+    @property
+    def coverage(self) -> float:
+        """Share of the pixels that have a coordinate."""
+        return float(np.isfinite(self.q[..., 0]).mean())
+
+
+def decode_image(
+    image: NDArray[np.integer] | NDArray[np.floating], network: Network, pattern: CodedGrid
+) -> DecodedGrid:
+    """Decode one image (H, W) or (H, W, 3), 8 or 16 bit, or floats where 1 is full scale.
+
+    Where nothing is decoded, the result says why: it is no error.
+
+    Raises:
+        InputError: not an image.
+    """
+    decoded = decode_heads(network.heads(image), pattern)
+    light = "" if not decoded.reason else _fault_of_light(one_channel(image))
+    return replace(decoded, reason=f"{light}{decoded.reason}")
+
+
+def _fault_of_light(gray: NDArray[np.float32]) -> str:
+    if np.quantile(gray, 0.99) < DARK:
+        return "the image is dark: "
+    if (gray >= SATURATED).mean() > 0.5:
+        return "the image is saturated: "
+    return ""
+
+
+def decode_heads(heads: Heads, pattern: CodedGrid) -> DecodedGrid:
+    """Decode the network's outputs for one image.
+
+    Raises:
+        InputError: no code of the pattern's size was found.
+    """
+    graph = build_graph(heads)
+    identity = identify(graph, pattern.code)
+    lattice = unwrap(heads, graph.nodes, identity)
+    q = pattern.pixels(lattice).astype(np.float32)
+    half = np.array([pattern.width, pattern.height], np.float32) / 2
+    q[larger((q - half + 0.5) / half) > 1] = np.nan
+    q[~agreeing(q, slack=pattern.period / 8)] = np.nan
+    known = np.isfinite(q[..., 0])
+    confidence = np.where(known, heads.confidence, 0).astype(np.float32)
+    return DecodedGrid(q, confidence, graph, identity, "" if known.any() else _reason(graph))
+
+
+def _reason(graph: GridGraph) -> str:
+    linked = int((graph.component >= 0).sum())
+    if linked < FEW_NODES:
+        return "no grid was found"
+    return f"a grid of {linked} nodes was found, but not this pattern's code"

@@ -1,0 +1,148 @@
+"""Which node of the pattern each node of the graph is, or that it cannot be told."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .graph import GridGraph, components
+from .links import Links
+from .potts import cut
+from .vote import Placement, evidence, scores_at, vote
+from .windows import candidates
+
+MIN_NODES = 9
+"""Of a part that is placed."""
+MIN_SCORE = 0.3
+"""Mean evidence of a placed part's nodes."""
+MIN_MARGIN = 6.0
+"""Evidence of a placed part over its next best placement."""
+MIN_SHARE = 0.4
+"""Of a component's nodes that must be placed, or else the whole of it is refused: the cut finds
+a few windows that fit in any grid, also in one with another code."""
+LARGE_PART = 60
+"""Nodes of a part that speaks for itself."""
+LINK_COST = 2.0
+"""Price, in evidence, of a link between two placements."""
+WEAKEST = 0.2
+"""Share of that price for the worst link."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identity:
+    """The nodes' places in the pattern."""
+
+    placed: NDArray[np.bool_]
+    """(N,) nodes that were identified."""
+    node: NDArray[np.intp]
+    """(N, 2) column and row in the pattern, -1 where not placed."""
+    turn: int
+    """1 if the pattern is seen upright, -1 upside down."""
+    read: float
+    """Share of the placed nodes whose most probable code is that of the pattern, 0 if none."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    members: NDArray[np.intp]
+    """Nodes of one part of a component."""
+    placement: Placement
+    score: float
+    component: int
+
+
+def identify(graph: GridGraph, pattern: NDArray[np.int8]) -> Identity:
+    """Identify the nodes by their codes, component by component.
+
+    Args:
+        graph: of the image.
+        pattern: (rows, columns) codes.
+    """
+    logs = evidence(graph.nodes.code)
+    parts: list[_Part] = []
+    for number in np.unique(graph.component[graph.component >= 0]):
+        members = np.flatnonzero(graph.component == number)
+        if len(members) >= MIN_NODES:
+            parts += _accepted(_parts(graph, members, logs, pattern), len(members))
+    parts = _same_way_up(parts)
+    return _without_doubles(graph, parts, logs, pattern)
+
+
+def _parts(
+    graph: GridGraph,
+    members: NDArray[np.intp],
+    logs: NDArray[np.float64],
+    pattern: NDArray[np.int8],
+) -> list[_Part]:
+    """Cut a component where two placements meet, and vote again within the parts."""
+    place, known = graph.place[members], logs[members]
+    whole = vote(place, known, pattern)
+    labels = list(dict.fromkeys([whole.best, *candidates(place, known, pattern)]))
+    cost = np.stack([-scores_at(label, place, known, pattern) for label in labels], -1)
+    # The last label stands for "none of them", at the evidence of chance.
+    cost = np.concatenate([cost, np.zeros((len(members), 1))], axis=1)
+    links = _within(graph.links, members, len(graph.nodes))
+    price = LINK_COST * (WEAKEST + (1 - WEAKEST) * links.quality)
+    label = cut(cost, links.start, links.end, price)
+    same = links.chosen(
+        (label[links.start] == label[links.end]) & (label[links.start] < len(labels))
+    )
+    number = components(same, len(members))
+    component = int(graph.component[members[0]])
+    found = []
+    for part in np.unique(number[number >= 0]):
+        inside = np.flatnonzero(number == part)
+        if len(inside) < MIN_NODES:
+            continue
+        again = vote(place[inside], known[inside], pattern)
+        if again.score >= MIN_SCORE * len(inside) and again.margin >= MIN_MARGIN:
+            found.append(_Part(members[inside], again.best, again.score, component))
+    return found
+
+
+def _within(links: Links, members: NDArray[np.intp], count: int) -> Links:
+    """Return the links between members, whose nodes are numbered by their place among them."""
+    number = np.full(count, -1)
+    number[members] = np.arange(len(members))
+    start, end = number[links.start], number[links.end]
+    inside = Links(start, end, links.axis, links.quality)
+    return inside.chosen((start >= 0) & (end >= 0))
+
+
+def _accepted(parts: list[_Part], nodes: int) -> list[_Part]:
+    """Refuse a component of which too little is placed."""
+    placed = [len(part.members) for part in parts]
+    if sum(placed) >= MIN_SHARE * nodes or max(placed, default=0) >= LARGE_PART:
+        return parts
+    return []
+
+
+def _same_way_up(parts: list[_Part]) -> list[_Part]:
+    """Keep the parts that agree on which way up the pattern is seen."""
+    upright = sum(part.placement.turn * part.score for part in parts)
+    return [part for part in parts if part.placement.turn * upright > 0]
+
+
+def _without_doubles(
+    graph: GridGraph, parts: list[_Part], logs: NDArray[np.float64], pattern: NDArray[np.int8]
+) -> Identity:
+    """Give each node of the pattern to one node of the image: a ray meets one lit point.
+
+    The part with more evidence keeps it; nodes of the same part that claim it both lose it.
+    """
+    placed = np.zeros(len(graph.nodes), bool)
+    node = np.full((len(graph.nodes), 2), -1)
+    taken = np.zeros(pattern.shape, bool)
+    for part in sorted(parts, key=lambda part: -part.score):
+        at = part.placement.of(graph.place[part.members])
+        inside = ((at >= 0) & (at < pattern.shape[::-1])).all(1)
+        at, members = at[inside], part.members[inside]
+        flat = at[:, 1] * pattern.shape[1] + at[:, 0]
+        once = np.bincount(flat, minlength=pattern.size)[flat] == 1
+        free = once & ~taken.ravel()[flat]
+        placed[members[free]] = True
+        node[members[free]] = at[free]
+        taken.ravel()[flat] = True
+    read = np.argmax(logs[placed], -1) == 1 - pattern[node[placed, 1], node[placed, 0]]
+    turn = parts[0].placement.turn if parts else 1
+    return Identity(placed, node, turn, float(read.mean()) if placed.any() else 0.0)

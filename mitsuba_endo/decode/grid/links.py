@@ -1,0 +1,108 @@
+"""Links between neighbouring nodes, along each of which the phase turns exactly once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
+
+from .heads import Heads
+from .nodes import Nodes, wrapped
+
+NEAR = 0.35
+"""Periods by which a neighbour may miss its predicted place."""
+MAX_TURN_ERROR = 0.2
+"""Periods by which the phase's integral along a link may miss its due."""
+MAX_EDGE = 0.5
+MIN_CONFIDENCE = 0.3
+"""Mean along a link: lower than a node's, because a highlight may lie on it."""
+SAMPLES = 13
+STEPS = np.array([[1, 0], [0, 1]])
+"""Place in the grid of the neighbour that a link leads to: the right one, the lower one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """L links, all from a node to its right or its lower neighbour."""
+
+    start: NDArray[np.intp]
+    """(L,) node."""
+    end: NDArray[np.intp]
+    """(L,) node."""
+    axis: NDArray[np.intp]
+    """(L,) 0: to the right, 1: downwards."""
+    quality: NDArray[np.float64]
+    """(L,) from 0 to 1: how well the phase turns, and how surely no depth edge is crossed."""
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @property
+    def step(self) -> NDArray[np.intp]:
+        """(L, 2) column and row of the end less those of the start."""
+        return STEPS[self.axis]
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Links":
+        """Return the links for which ``which`` (L,) holds."""
+        return Links(self.start[which], self.end[which], self.axis[which], self.quality[which])
+
+
+def find_links(nodes: Nodes, heads: Heads) -> Links:
+    """Return the links of mutual neighbours along which phase, confidence and edges allow it."""
+    if len(nodes) < 2:
+        none = np.empty(0, np.intp)
+        return Links(none, none, none, np.empty(0))
+    parts = [_mutual(nodes, step) for step in STEPS]
+    start, end = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
+    axis = np.repeat([0, 1], [len(p[0]) for p in parts])
+    links = Links(start, end, axis, np.ones(len(start)))
+    return _checked(links, nodes, heads)
+
+
+def _mutual(nodes: Nodes, step: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return nodes whose neighbour in this direction has them as its neighbour back."""
+    forward, back = _neighbour(nodes, step), _neighbour(nodes, -step)
+    start = np.flatnonzero(forward >= 0)
+    end = forward[start]
+    both = back[end] == start
+    return start[both], end[both]
+
+
+def _neighbour(nodes: Nodes, step: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return for each node (N,) the one nearest to where its neighbour is due; -1 if none."""
+    inverse = np.linalg.inv(nodes.slope)
+    _, found = cKDTree(nodes.at).query(nodes.at + inverse @ step)
+    apart = np.einsum("nij,nj->ni", nodes.slope, nodes.at[found] - nodes.at) - step
+    near = (np.abs(apart).max(1) < NEAR) & (found != np.arange(len(nodes)))
+    return np.where(near, found, -1)
+
+
+def _checked(links: Links, nodes: Nodes, heads: Heads) -> Links:
+    """Integrate the phase along the links, and look for depth edges on them."""
+    share = np.linspace(0, 1, SAMPLES)[:, None, None]
+    path = (1 - share) * nodes.at[links.start] + share * nodes.at[links.end]
+    at = path[..., ::-1].transpose(2, 0, 1)
+    turned = _integral(heads.phase, at)
+    error = np.abs(turned - links.step).max(1)
+    edge = _sample(heads.edge, at).max(0)
+    sure = _sample(heads.confidence, at).mean(0)
+    good = (error < MAX_TURN_ERROR) & (edge < MAX_EDGE) & (sure > MIN_CONFIDENCE)
+    quality = np.clip((1 - error / MAX_TURN_ERROR) * (1 - edge / MAX_EDGE), 0, 1)
+    return Links(links.start, links.end, links.axis, quality).chosen(good)
+
+
+def _integral(phase: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the turns (L, 2) of the phase along paths ``at`` (2, samples, L), row and column."""
+    turns = []
+    for axis in (0, 1):
+        angle = 2 * np.pi * phase[..., axis]
+        sampled = np.arctan2(_sample(np.sin(angle), at), _sample(np.cos(angle), at))
+        steps = wrapped(np.diff(sampled / (2 * np.pi), axis=0))
+        # Neighbouring samples are a twelfth of a period apart; longer steps are jumps.
+        turns.append(np.where(np.abs(steps).max(0) < 0.35, steps.sum(0), np.nan))
+    return np.nan_to_num(np.stack(turns, -1), nan=9.0)
+
+
+def _sample(image: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    return np.asarray(map_coordinates(image, at, order=1, mode="nearest"), np.float32)
