@@ -47,10 +47,9 @@ def section(docstring: str) -> str:
     body = re.search(r"^\S", rest, re.MULTILINE)
     end = body.start() if body else len(rest)
     text, _, examples = rest[end:].partition(".. tabs::")
-    return "\n\n".join(
-        [f"## {title['name']}", title["what"] + ".", _table(rest[:end]), _plain(text.strip())]
-        + _examples(examples)
-    )
+    head = [f"## {title['name']}", title["what"] + "."]
+    parts = [*head, _table(rest[:end]), _plain(text.strip()), *_examples(examples)]
+    return "\n\n".join(parts)
 
 
 def _table(source: str) -> str:
