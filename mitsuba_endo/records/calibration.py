@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
+from ..geometry.transforms import RigidTransform
 from .checkpoint import Checkpoint
 from .solution import Solution
 
@@ -20,6 +21,10 @@ class SurfaceEstimate:
     """(F, 3) vertex indices."""
     std: NDArray[np.float64] | None = None
     """(V,) standard deviation along the viewing direction, same unit; None if not computed."""
+    modes: NDArray[np.float64] | None = None
+    """(V, K) the part of ``std`` that all vertices share, because it comes from the calibration:
+    the covariance of two vertices' errors along their directions is the product of their rows,
+    and what is left of their variances is their own. Without the unit's own uncertainty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,25 @@ class TraceRow:
 
 
 @dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Where the optimisation stood after an iteration; surfaces are coarse."""
+
+    iteration: int
+    """0 is the start."""
+    cost: float | None
+    """As in :class:`TraceRow`; None at the start."""
+    focal: list[float]
+    """Of every frame, pattern pixels."""
+    surfaces: list[NDArray[np.float64]]
+    """(V, 3) vertices of every surface, the frame of its first camera."""
+    faces: list[NDArray[np.int64]]
+    """(F, 3) triangles of every surface; the same list for snapshots of the same mesh."""
+    world_from_camera: list[RigidTransform]
+    projector_from_camera: list[RigidTransform]
+    """Of every frame."""
+
+
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """Result of :func:`mitsuba_endo.solve.calibrate.calibrate`."""
 
@@ -72,3 +96,5 @@ class Calibration:
     own_surfaces: dict[int, SurfaceEstimate] = field(default_factory=dict)
     """Where frames do not share a surface: those of the frames after the first, by index, each in
     its camera's frame."""
+    history: list[Snapshot] = field(default_factory=list)
+    """How the optimisation went, the solution's unit."""

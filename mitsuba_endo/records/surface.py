@@ -1,5 +1,8 @@
 """The measured surface as a PLY file."""
 
+import zipfile
+import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +15,8 @@ from .calibration import SurfaceEstimate
 
 # Mitsuba asks for a postfix: it then offers the values as the mesh attribute `vertex_std`.
 STD_PROPERTY = "std_0"
+MODES = "surface_modes.npz"
+"""The surfaces' modes, by the names of the surfaces' files; beside them."""
 
 
 def save_surface(path: str | Path, surface: SurfaceEstimate) -> None:
@@ -26,6 +31,43 @@ def save_surface(path: str | Path, surface: SurfaceEstimate) -> None:
     data: Any = mesh.export(file_type="ply", vertex_normal=False)
     with atomic_path(path) as aside:
         aside.write_bytes(data)
+
+
+def save_modes(path: str | Path, surfaces: dict[str, SurfaceEstimate]) -> None:
+    """Write the modes of surfaces by their file names, in half precision.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    arrays: dict[str, Any] = {
+        name: surface.modes.astype(np.float16)
+        for name, surface in surfaces.items()
+        if surface.modes is not None
+    }
+    with atomic_path(path) as aside:
+        np.savez_compressed(aside, **arrays)
+
+
+def load_with_modes(path: str | Path) -> SurfaceEstimate:
+    """Read a surface of a solution folder with its modes, which older folders do not hold.
+
+    Raises:
+        InputError: as :func:`load_surface`, or the modes are damaged or of another surface.
+    """
+    path = Path(path)
+    surface = load_surface(path)
+    beside = path.with_name(MODES)
+    if not beside.is_file():
+        return surface
+    try:
+        # NumPy itself leaves a damaged file open.
+        with beside.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            modes = data[path.name].astype(np.float64) if path.name in data else None
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise InputError("is not a readable npz file", str(beside), "calibrate again") from None
+    if modes is not None and len(modes) != len(surface.vertices):
+        raise InputError(f"is not that of {path.name}", str(beside), "calibrate again")
+    return replace(surface, modes=modes)
 
 
 def load_surface(path: str | Path) -> SurfaceEstimate:

@@ -1,8 +1,10 @@
-"""File names of the maps in a solution folder."""
+"""File names of maps and surfaces in a solution folder."""
 
 import re
 from collections.abc import Sequence
 from pathlib import Path
+
+SURFACE = "surface.ply"
 
 
 def map_names(frames: Sequence[str]) -> list[str]:
@@ -13,6 +15,11 @@ def map_names(frames: Sequence[str]) -> list[str]:
 def observed_names(frames: Sequence[str]) -> list[str]:
     """Return the file names of the observed maps: ``observed.exr``, or one a frame."""
     return _names("observed", frames)
+
+
+def own_surface_name(frame: int) -> str:
+    """Return the file name of the surface of one frame, where frames do not share one."""
+    return f"surface_{frame:02d}.ply" if frame else SURFACE
 
 
 def _names(kind: str, frames: Sequence[str]) -> list[str]:

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..records.calibration import Calibration, FrameMaps, TraceRow
+from ..records.calibration import Calibration, FrameMaps, SurfaceEstimate, TraceRow
 from ..records.correspondence import CHANNELS, read_exr, write_exr
+from ..records.history import load_history
 from ..records.solution import load_solution
-from ..records.surface import load_surface
-from .map_names import map_names, observed_names
+from ..records.surface import load_with_modes
+from .map_names import map_names, observed_names, own_surface_name
 
 USED = "used"
 """Channel of the observed maps: 1 where the solver used the correspondence."""
@@ -24,7 +25,7 @@ def save_observed(path: str | Path, frame: FrameMaps) -> None:
 
 
 def read_solution_folder(path: str | Path) -> Calibration:
-    """Read what pictures and reports are made of; the checkpoint and the other surfaces stay.
+    """Read what pictures, reports and the viewer are made of; the checkpoint stays.
 
     Raises:
         InputError: a file is missing or damaged.
@@ -43,9 +44,18 @@ def read_solution_folder(path: str | Path) -> Calibration:
             names, map_names(names), observed_names(names), strict=True
         )
     ]
-    surface = load_surface(folder / solution.surface)
+    surface = load_with_modes(folder / solution.surface)
     trace = _trace(folder / "trace.csv")
-    return Calibration(solution, solution.camera.to_model(), surface, frames, trace)
+    return Calibration(
+        solution, solution.camera.to_model(), surface, frames, trace,
+        own_surfaces=_own_surfaces(folder, len(names)), history=load_history(folder),
+    )  # fmt: skip
+
+
+def _own_surfaces(folder: Path, frames: int) -> dict[int, SurfaceEstimate]:
+    """Return the surfaces of frames after the first, where frames do not share one."""
+    paths = {k: folder / own_surface_name(k) for k in range(1, frames)}
+    return {k: load_with_modes(path) for k, path in paths.items() if path.is_file()}
 
 
 def _frame(folder: Path, name: str, rendered: str, observed: str) -> FrameMaps:

@@ -12,17 +12,18 @@ from ..records.calibration import Calibration, TraceRow
 from ..records.checkpoint import FILE as CHECKPOINT
 from ..records.checkpoint import save_checkpoint
 from ..records.correspondence import save_map
+from ..records.history import FILE as HISTORY
+from ..records.history import save_history, thinned
 from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
-from ..records.surface import save_surface
+from ..records.surface import MODES, save_modes, save_surface
 from . import figures
-from .map_names import map_names, observed_names
+from .map_names import SURFACE, map_names, observed_names, own_surface_name
 from .read_folder import save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
 from .view import SurfaceView, view_surface
 
-SURFACE = "surface.ply"
 SCENE = "scene.xml"
 
 
@@ -40,7 +41,9 @@ def write_solution_folder(
                           value it needs could not be determined
     rendered*.exr         projector coordinates rendered from the solution, one file a frame
     observed*.exr         projector coordinates as they came in, and which of them were used
+    surface_modes.npz     what the errors of a surface's vertices have in common
     trace.csv             the iterations
+    history.npz           where they stood: poses and coarse surfaces, for the viewer
     state.npz             from which ``calibrate --resume`` goes on
     rig.yaml              the rig with all defaults filled in, if given
     report.html           look at this first: verdict, maps, numbers, provenance; needs no network
@@ -60,7 +63,10 @@ def write_solution_folder(
         save_surface(folder / SURFACE, calibration.surface)
         for k, surface in calibration.own_surfaces.items():
             save_surface(folder / own_surface_name(k), surface)
+        _save_modes(folder, calibration)
         save_trace(folder / "trace.csv", calibration.trace)
+        if calibration.history:
+            save_history(folder / HISTORY, thinned(calibration.history))
         if calibration.checkpoint is not None:
             save_checkpoint(folder / CHECKPOINT, calibration.checkpoint)
         names = [frame.name for frame in calibration.frames]
@@ -77,9 +83,12 @@ def write_solution_folder(
     return solution
 
 
-def own_surface_name(frame: int) -> str:
-    """Return the file name of the surface of one frame, where frames do not share one."""
-    return f"surface_{frame:02d}.ply" if frame else SURFACE
+def _save_modes(folder: Path, calibration: Calibration) -> None:
+    surfaces = {own_surface_name(0): calibration.surface} | {
+        own_surface_name(k): surface for k, surface in calibration.own_surfaces.items()
+    }
+    if any(surface.modes is not None for surface in surfaces.values()):
+        save_modes(folder / MODES, surfaces)
 
 
 def save_trace(path: str | Path, trace: list[TraceRow]) -> None:

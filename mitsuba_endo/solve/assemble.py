@@ -11,6 +11,7 @@ from .. import __version__
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration
+from ..records.history import scaled
 from ..records.rig import Camera, Rig
 from ..records.solution import (
     Alternative,
@@ -142,6 +143,7 @@ def assemble(
     return Calibration(
         solution, camera, surfaces[0], frame_maps(fit, renderings), fit.optimum.trace,
         checkpoint_of(fit.optimum), dict(enumerate(surfaces[1:], 1)),
+        scaled(fit.history, unit.factor),
     )  # fmt: skip
 
 

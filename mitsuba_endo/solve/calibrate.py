@@ -7,10 +7,12 @@ from ..records.calibration import Calibration
 from ..records.checkpoint import Checkpoint
 from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
+from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
 from .assemble import assemble
 from .fit import Fit
+from .history import History
 from .law_evidence import choose_law
 from .options import Options
 from .pipeline import Job, solve
@@ -23,6 +25,7 @@ def calibrate(
     options: Options | None = None,
     progress: Progress | None = None,
     resume: Checkpoint | None = None,
+    observe: Observe | None = None,
 ) -> Calibration:
     """Calibrate a projector from correspondence maps.
 
@@ -32,6 +35,7 @@ def calibrate(
         options: how to solve.
         progress: called with the share of the work done and the name of the step.
         resume: an earlier calibration of these maps to go on with; its law is kept.
+        observe: called after every iteration with where it stands, lengths in baselines.
 
     Returns:
         The solution with the surface, the rendered maps and the trace of the optimisation.
@@ -54,7 +58,7 @@ def calibrate(
     with threadpool_limits(1, "blas"):
         fits: list[Fit] = []
         for i, law in enumerate(laws):
-            job = Job(maps, camera, rig, law, options, resume)
+            job = Job(maps, camera, rig, law, options, resume, history=History(observe))
             fits.append(solve(job, _part(say, i, len(laws))))
             if fits[-1].optimum.outcome is Outcome.INTERRUPTED:
                 fits = fits[-1:]  # the user wants to go on with this one

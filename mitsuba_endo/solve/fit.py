@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from ..records.calibration import Snapshot
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut
 from .observability import Direction
@@ -32,6 +33,8 @@ class Fit:
     """Seconds of every stage."""
     foreseen: list[Direction]
     """What the data were expected to leave free, before the optimisation."""
+    history: list[Snapshot]
+    """Coarse states from the start to the optimum."""
 
     @property
     def problem(self) -> Problem:

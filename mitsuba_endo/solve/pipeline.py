@@ -18,6 +18,7 @@ from .drift import drift_prior
 from .fit import Fit
 from .foresight import foreseen_directions
 from .frames import common_start, solve_alone, usable_starts, without_faults, without_repeats
+from .history import History
 from .joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
 from .observability import Direction
 from .optimum import Optimum
@@ -50,6 +51,8 @@ class Job:
     """Seconds of every stage, filled in while solving."""
     foreseen: list[Direction] = field(default_factory=list)
     """What the start of the last optimisation leaves free, likewise."""
+    history: History = field(default_factory=History)
+    """How the last optimisation went, likewise."""
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -189,6 +192,8 @@ def _optimise(
     with job.timed("observability"):
         job.foreseen[:] = foreseen_directions(problem, state, job.options.finish)
     extra = drift_prior(job.rig, problem.plan)
+    job.history.begin(problem, state)
+    report = job.history.recording(report)
     optimum = optimise(problem, state, job.options, extra, report, stage)
     for _ in range(_MAX_EXTENSIONS):
         if problem.plan.surface != "shared" or optimum.outcome is not Outcome.CONVERGED:
@@ -197,6 +202,7 @@ def _optimise(
         if grown is None:
             break
         trace = optimum.trace
+        job.history.go_on(grown[0])
         optimum = optimise(*grown, job.options, extra, report)
         optimum = replace(optimum, trace=_continued(trace, optimum.trace))
     return optimum
@@ -237,4 +243,4 @@ def _finish(
         known = uncertainty(optimum, reported, job.options.jackknife)
     given = [m.name for m in job.maps]
     return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings,
-               job.foreseen)  # fmt: skip
+               job.foreseen, job.history.snapshots)  # fmt: skip

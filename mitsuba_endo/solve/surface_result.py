@@ -75,10 +75,12 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
     lattice, rho = fit.problem.surfaces[surface].lattice, fit.state.rho[surface]
     faces = lattice.faces[seen_faces(fit.reported, surface)]
     kept, flat = np.unique(faces, return_inverse=True)
-    std = inflation * fit.uncertainty.rho_std[surface] / rho**2
+    from_rho = factor * inflation / rho[kept] ** 2  # standard deviations: the sign is free
     return SurfaceEstimate(
-        factor * lattice.vertices(rho)[kept], flat.reshape(-1, 3), factor * std[kept]
-    )
+        factor * lattice.vertices(rho)[kept], flat.reshape(-1, 3),
+        from_rho * fit.uncertainty.rho_std[surface][kept],
+        from_rho[:, None] * fit.uncertainty.rho_modes[surface][kept],
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

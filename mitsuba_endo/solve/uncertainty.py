@@ -21,6 +21,8 @@ BLOCKS = 4
 """Blocks along each side of an image."""
 MIN_FRAMES = 4
 """Frames from which on leaving out whole frames is meaningful."""
+MODES = 6
+"""Directions kept of what a calibration's error does to a surface."""
 _SMALLEST_BLOCK = 20
 """Observations below which a block is not worth leaving out."""
 
@@ -39,6 +41,9 @@ class Uncertainty:
     """(G, G) leaving out whole frames; for shared unknowns only."""
     rho_std: list[NDArray[np.float64]]
     """(V,) formal standard deviation of the inverse ranges of every surface."""
+    rho_modes: list[NDArray[np.float64]]
+    """(V, K) what the inverse ranges of every surface have in common: rows whose products are the
+    covariances that come from the global unknowns."""
     information: NDArray[np.float64]
     """(G, G) information of the data over the noise variance; inverse of ``formal``."""
 
@@ -71,6 +76,7 @@ def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncerta
             np.sqrt(shrinkage * variance * _surface_variance(factor, x[:, :-1], S_inverse))
             for factor, x in zip(smooth.factors, smooth.eliminated, strict=True)
         ],
+        rho_modes=[shared_modes(x[:, :-1], formal) for x in smooth.eliminated],
         information=information / (shrinkage * variance),
     )
 
@@ -118,6 +124,22 @@ def _surface_variance(
     """Diagonal of the surface's block of H^-1: A^-1 + X S^-1 X^T with X = A^-1 B."""
     n = np.arange(len(coupling))
     return factor.inverse().entries(n, n) + np.einsum("vi,vi->v", coupling @ S_inverse, coupling)
+
+
+def shared_modes(
+    coupling: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return modes M (V, K) whose product M M^T is X C X^T, but for its weakest directions.
+
+    Vertices follow the global unknowns by X = A^-1 B (V, G), whose covariance is C (G, G). K is
+    at most :data:`MODES`.
+    """
+    if not len(covariance):
+        return np.zeros((len(coupling), 0))
+    values, vectors = np.linalg.eigh(covariance)
+    moved = coupling @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    _, strongest = np.linalg.eigh(moved.T @ moved)
+    return moved @ strongest[:, ::-1][:, :MODES]
 
 
 def inverse_information(S: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,0 +1,64 @@
+"""The decoded grid drawn over its image."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..decode.grid.decode import DecodedGrid
+
+WIDTH = 1200
+"""Least width of the picture, pixels; the image is enlarged by a whole factor."""
+DIMMED = 0.55
+COLOURS = ((178, 114, 0), (0, 159, 230), (115, 158, 0), (167, 121, 204))
+"""Blue, orange, green, purple (B, G, R) of Okabe and Ito's palette, in turn from line to line."""
+REFUSED = (235, 235, 235)
+LABELLED = 8
+"""Every so many columns and rows a node is labelled with them."""
+FINE = 16
+"""Subpixel positions of OpenCV's lines: 2^4."""
+
+
+def grid_picture(
+    image: NDArray[np.integer] | NDArray[np.floating], decoded: DecodedGrid
+) -> NDArray[np.uint8]:
+    """Return a picture (h, w, 3), BGR, of the graph over the image (H, W) or (H, W, C).
+
+    Each line of the pattern has one colour, so a line that changes its colour is wrong. White are
+    nodes and links that were found and refused.
+    """
+    factor = max(1, -(-WIDTH // image.shape[1]))
+    canvas = _canvas(image, factor)
+    graph, identity = decoded.graph, decoded.identity
+    at = np.rint((graph.nodes.at + 0.5) * factor * FINE - 0.5 * FINE).astype(int)
+    links = graph.links
+    placed = identity.placed[links.start] & identity.placed[links.end]
+    fits = identity.turn * links.step == (identity.node[links.end] - identity.node[links.start])
+    placed &= fits.all(1)
+    for k in range(len(links)):
+        # A vertical link belongs to a column, a horizontal one to a row.
+        line = int(identity.node[links.start[k], 1 - links.axis[k]])
+        colour = COLOURS[line % len(COLOURS)] if placed[k] else REFUSED
+        ends = [tuple(int(c) for c in at[node]) for node in (links.start[k], links.end[k])]
+        cv2.line(canvas, *ends, colour, 2 if placed[k] else 1, cv2.LINE_AA, 4)
+    for k in np.flatnonzero(~identity.placed):
+        x, y = (int(c) for c in at[k])
+        cv2.circle(canvas, (x, y), 3 * FINE, REFUSED, 1, cv2.LINE_AA, 4)
+    for k in np.flatnonzero(identity.placed & (identity.node % LABELLED == 0).all(1)):
+        _label(canvas, at[k] // FINE, f"{identity.node[k, 0]},{identity.node[k, 1]}")
+    if decoded.reason:
+        _label(canvas, np.array([4, 24]), decoded.reason)
+    return canvas
+
+
+def _canvas(image: NDArray[np.integer] | NDArray[np.floating], factor: int) -> NDArray[np.uint8]:
+    gray = np.atleast_3d(np.asarray(image, np.float32)).max(-1)
+    bright = max(float(np.percentile(gray, 99.5)), 1e-6)
+    shown = np.clip(gray / bright, 0, 1) ** 0.7 * 255 * DIMMED
+    large = cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC)
+    return np.repeat(np.clip(large, 0, 255).astype(np.uint8)[..., None], 3, axis=-1)
+
+
+def _label(canvas: NDArray[np.uint8], at: NDArray[np.integer], text: str) -> None:
+    place = (int(at[0]) + 4, int(at[1]) - 4)
+    for colour, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, thick, cv2.LINE_AA)

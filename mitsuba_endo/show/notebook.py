@@ -1,0 +1,21 @@
+"""Results as a notebook shows them: the report's verdict and table in a cell."""
+
+from ..records.solution import Solution
+from . import report_sections as sections
+
+_STYLE = """
+.mitsuba-endo .badge { padding: 0 .5em; border-radius: .6em; background: #d5ebe4; color: #12382c; }
+.mitsuba-endo .badge.wary { background: #f6dfc0; color: #4a2c00; }
+.mitsuba-endo table { margin: .6em 0; border-collapse: collapse; }
+.mitsuba-endo th, .mitsuba-endo td { text-align: left; padding: .15em .8em; }
+.mitsuba-endo .number { text-align: right; font-variant-numeric: tabular-nums; }
+.mitsuba-endo .group th { border-bottom: 1px solid; }
+.mitsuba-endo .reason { opacity: .75; }
+.mitsuba-endo tr.unobservable td { opacity: .75; }
+"""
+
+
+def solution_html(solution: Solution) -> str:
+    """Return verdict and values of a solution as a piece of HTML that brings its own style."""
+    body = sections.verdict(solution) + sections.number_table(solution)
+    return f'<style>{_STYLE}</style><div class="mitsuba-endo">{body}</div>'
