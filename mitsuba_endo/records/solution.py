@@ -174,6 +174,13 @@ class Solution(Record):
     versions: dict[str, str] = {}
     configuration: dict[str, Any] = {}
 
+    def _repr_html_(self) -> str:
+        """Show verdict and values where a notebook asks for them."""
+        # Notebooks look for the method here. The only look up the house, and not before asked.
+        from ..show.notebook import solution_html
+
+        return solution_html(self)
+
 
 def save_solution(path: str | Path, solution: Solution) -> None:
     """Write a solution or truth file."""
