@@ -6,6 +6,7 @@ import typer
 
 from .. import __version__
 from .calibrate import calibrate
+from .decode import decode
 from .decode_stack import decode_stack
 from .demo import demo
 from .doctor import doctor
@@ -21,7 +22,18 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-COMMANDS = (demo, doctor, render, patterns, decode_stack, calibrate, evaluate, report, export)
+COMMANDS = (
+    demo,
+    doctor,
+    render,
+    patterns,
+    decode,
+    decode_stack,
+    calibrate,
+    evaluate,
+    report,
+    export,
+)
 for command in COMMANDS:
     app.command()(command)
 

@@ -5,11 +5,10 @@ that scenes need no files beside them and every shape parameter can be set from 
 """
 
 from pathlib import Path
-from urllib.parse import parse_qsl
 
 import numpy as np
 
-from ..errors import InputError
+from ..description import read_description
 from ..records.correspondence import write_exr
 from ..shapes import make_shape
 from .pattern import make_pattern
@@ -21,16 +20,10 @@ def generate(parameter: str, value: str, folder: Path) -> str:
     Raises:
         InputError: the description names no such shape, pattern or parameter.
     """
-    kind, colon, description = value.partition(":")
+    kind, colon, _ = value.partition(":")
     if not colon or kind not in ("shape", "pattern"):
         return value
-    name, _, query = description.partition("?")
-    try:
-        settings = dict(parse_qsl(query, strict_parsing=True)) if query else {}
-    except ValueError:
-        raise InputError(
-            f"{value!r} cannot be read", parameter, f"write it as {kind}:NAME?name=value&name=value"
-        ) from None
+    name, settings = read_description(value, kind, parameter)
     if kind == "shape":
         path = folder / f"{parameter}.ply"
         make_shape(name, **settings).save(path)

@@ -38,11 +38,10 @@ def grid_picture(
         # A vertical link belongs to a column, a horizontal one to a row.
         line = int(identity.node[links.start[k], 1 - links.axis[k]])
         colour = COLOURS[line % len(COLOURS)] if placed[k] else REFUSED
-        ends = [tuple(int(c) for c in at[node]) for node in (links.start[k], links.end[k])]
-        cv2.line(canvas, *ends, colour, 2 if placed[k] else 1, cv2.LINE_AA, 4)
+        start, end = at[links.start[k]].tolist(), at[links.end[k]].tolist()
+        cv2.line(canvas, start, end, colour, 2 if placed[k] else 1, cv2.LINE_AA, 4)
     for k in np.flatnonzero(~identity.placed):
-        x, y = (int(c) for c in at[k])
-        cv2.circle(canvas, (x, y), 3 * FINE, REFUSED, 1, cv2.LINE_AA, 4)
+        cv2.circle(canvas, at[k].tolist(), 3 * FINE, REFUSED, 1, cv2.LINE_AA, 4)
     for k in np.flatnonzero(identity.placed & (identity.node % LABELLED == 0).all(1)):
         _label(canvas, at[k] // FINE, f"{identity.node[k, 0]},{identity.node[k, 1]}")
     if decoded.reason:

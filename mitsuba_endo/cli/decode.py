@@ -1,0 +1,170 @@
+"""``mitsuba-endo decode``: from images of the coded grid to correspondence maps."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import EXIT_FAULT, Debug, Json, Quiet, Session, session
+
+if TYPE_CHECKING:
+    from ..decode.grid.decode import DecodedGrid
+    from ..decode.image_files import Frame
+    from ..records.rig import Rig
+
+Images = Annotated[
+    list[Path],
+    typer.Argument(metavar="IMAGE...", help="Images, folders of images, or videos."),
+]
+RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: size of image and pattern.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
+Pattern = Annotated[
+    str, typer.Option(help="The projected pattern, e.g. pattern:coded?seed=3; size as in the rig.")
+]
+Weights = Annotated[
+    Path | None, typer.Option(help="Another decoder network, as an ONNX file.", show_default=False)
+]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What was found in one image."""
+
+    name: str
+    nodes: int
+    """Nodes with links."""
+    placed: int
+    """Of them, identified in the pattern."""
+    coverage: float
+    """Share of the pixels that have a coordinate."""
+    reason: str
+    """Why nothing was decoded; empty if something was."""
+
+    def line(self) -> str:
+        if self.reason:
+            return f"{self.name}: nothing decoded: {self.reason}."
+        return (
+            f"{self.name}: {self.placed} of {self.nodes} nodes identified, "
+            f"{self.nodes - self.placed} rejected, {100 * self.coverage:.1f} % of the pixels "
+            "decoded."
+        )
+
+
+def decode(
+    images: Images,
+    rig: RigFile,
+    out: Out,
+    pattern: Pattern = "pattern:coded",
+    weights: Weights = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Decode images of the coded grid into correspondence maps, one a frame.
+
+    NAME.exr is the map with the confidence as third channel, NAME_graph.png the grid found. An
+    image without this pattern gets no map; if that is every one, the exit code is 3.
+    """
+    with session(quiet, as_json, debug) as output:
+        from ..files import atomic_folder, check_output_folder
+        from ..records.rig import load_rig
+
+        check_output_folder(out)
+        record = load_rig(rig)
+        with atomic_folder(out) as folder:
+            found = decode_into(folder, images, record, pattern, weights, output)
+            refuse_nothing(found)
+        decoded = [one for one in found if not one.reason]
+        output.print(*(one.line() for one in found))
+        output.summary({"folder": str(out), "frames": [_fields(one) for one in found]})
+        raise typer.Exit(0 if len(decoded) == len(found) else EXIT_FAULT)
+
+
+def decode_into(
+    folder: Path,
+    images: Sequence[Path],
+    rig: "Rig",
+    pattern: str,
+    weights: Path | None,
+    output: Session,
+) -> list[Summary]:
+    """Decode images, write maps and pictures of those with a pattern, and say what was found.
+
+    Raises:
+        InputError: an image that cannot be read or is not of the rig's size, a wrong pattern or
+            network.
+    """
+    from ..decode.grid.decode import decode_image
+    from ..decode.grid.network import load_network
+    from ..decode.image_files import read_frames
+    from ..decode.pattern_option import coded_grid
+
+    grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
+    network = load_network(weights)
+    found = []
+    with output.progress("Decoding") as advance:
+        for frame in _sized(read_frames(images), rig):
+            advance(0.0, f"Decoding {frame.name}")
+            result = decode_image(frame.image, network, grid)
+            linked = int((result.graph.component >= 0).sum())
+            placed = int(result.identity.placed.sum())
+            found.append(Summary(frame.name, linked, placed, result.coverage, result.reason))
+            _write(folder, frame, result)
+    return found
+
+
+def refuse_nothing(found: Sequence[Summary]) -> None:
+    """Refuse images none of which shows the pattern.
+
+    Raises:
+        NothingDecodedError: says why for the first one.
+    """
+    from ..errors import NothingDecodedError
+
+    if found and all(one.reason for one in found):
+        first = found[0]
+        where = first.name if len(found) == 1 else f"{first.name} and {len(found) - 1} more"
+        raise NothingDecodedError(first.reason, where, "check the pattern, light and focus")
+
+
+def map_path(folder: Path, frame: str) -> Path:
+    """Return where the map of a frame is written."""
+    return folder / f"{frame}.exr"
+
+
+def _sized(frames: "Iterator[Frame]", rig: "Rig") -> "Iterator[Frame]":
+    from ..errors import InputError
+
+    for frame in frames:
+        height, width = frame.image.shape[:2]
+        if (width, height) != (rig.camera.width, rig.camera.height):
+            raise InputError(
+                f"is {width} x {height} pixels and the rig's camera.width x camera.height "
+                f"{rig.camera.width} x {rig.camera.height}",
+                frame.source, "give the rig of the camera that took it",
+            )  # fmt: skip
+        yield frame
+
+
+def _write(folder: Path, frame: "Frame", result: "DecodedGrid") -> None:
+    import cv2
+
+    from ..records.correspondence import CHANNELS, write_exr
+    from ..show.grid_picture import grid_picture
+
+    picture = grid_picture(frame.image, result)
+    # OpenCV reports a full disk by its return value only.
+    if not cv2.imwrite(str(folder / f"{frame.name}_graph.png"), picture):
+        raise OSError("the picture was not written")
+    if result.reason:
+        return
+    channels = {name: result.q[..., i] for i, name in enumerate(CHANNELS)}
+    write_exr(map_path(folder, frame.name), channels | {"confidence": result.confidence})
+
+
+def _fields(one: Summary) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return asdict(one)
