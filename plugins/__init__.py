@@ -7,7 +7,7 @@ scenes without them, silently, after a switch back.
 
 import importlib
 
-MODULES = ("doe_projector", "projector_coords", "endoscope")
+MODULES = ("doe_projector", "projector_coords", "endoscope", "vessels", "tissue_relief")
 
 _callback_installed = False
 

@@ -129,9 +129,20 @@ def _surface(mesh: Mesh, tissue: Tissue) -> Any:
 
 
 def _bsdf(tissue: Tissue) -> dict[str, Any]:
-    return {"type": "twosided", "bsdf": {
-        "type": "principled",
-        "base_color": {"type": "rgb", "value": list(tissue.base_color)},
+    wet: dict[str, Any] = {
+        "type": "principled", "base_color": _colour(tissue),
         "roughness": tissue.roughness, "specular": tissue.specular,
         "clearcoat": tissue.clearcoat, "clearcoat_gloss": tissue.clearcoat_gloss,
-    }}  # fmt: skip
+    }  # fmt: skip
+    if tissue.relief:
+        fine = {"type": "tissue_relief", "slope": tissue.relief, "seed": tissue.seed}
+        wet = {"type": "bumpmap", "relief": fine, "bsdf": wet}
+    return {"type": "twosided", "bsdf": wet}
+
+
+def _colour(tissue: Tissue) -> dict[str, Any]:
+    base = {"type": "rgb", "value": list(tissue.base_color)}
+    if not tissue.vessel_contrast:
+        return base
+    return {"type": "vessels", "base": base, "contrast": tissue.vessel_contrast,
+            "scale": tissue.vessel_scale, "seed": tissue.seed}  # fmt: skip
