@@ -53,20 +53,37 @@ def find_links(nodes: Nodes, heads: Heads) -> Links:
     if len(nodes) < 2:
         none = np.empty(0, np.intp)
         return Links(none, none, none, np.empty(0))
-    parts = [_mutual(nodes, step) for step in STEPS]
+    parts = [_proposed(nodes, step) for step in STEPS]
     start, end = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
     axis = np.repeat([0, 1], [len(p[0]) for p in parts])
     links = Links(start, end, axis, np.ones(len(start)))
-    return _checked(links, nodes, heads)
+    return _best_of_each(_checked(links, nodes, heads))
 
 
-def _mutual(nodes: Nodes, step: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return nodes whose neighbour in this direction has them as its neighbour back."""
+def _proposed(nodes: Nodes, step: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of nodes of which one lies where the other expects it.
+
+    Not each where the other expects it: the slope at a node beside a depth edge is wrong, and
+    whether the pair belongs together is told by the phase between them.
+    """
     forward, back = _neighbour(nodes, step), _neighbour(nodes, -step)
-    start = np.flatnonzero(forward >= 0)
-    end = forward[start]
-    both = back[end] == start
-    return start[both], end[both]
+    ahead, behind = np.flatnonzero(forward >= 0), np.flatnonzero(back >= 0)
+    pairs = np.concatenate([np.column_stack([ahead, forward[ahead]]),
+                            np.column_stack([back[behind], behind])])  # fmt: skip
+    start, end = np.unique(pairs, axis=0).T
+    return start, end
+
+
+def _best_of_each(links: Links) -> Links:
+    """Keep the links that are the best of both their ends in their direction."""
+    order = np.lexsort((-links.quality, links.axis))
+    best = np.ones(len(links), bool)
+    for end in (links.start, links.end):
+        pairs = np.column_stack([links.axis, end])[order]
+        first = np.zeros(len(links), bool)
+        first[np.unique(pairs, axis=0, return_index=True)[1]] = True
+        best[order] &= first
+    return links.chosen(best)
 
 
 def _neighbour(nodes: Nodes, step: NDArray[np.intp]) -> NDArray[np.intp]:
