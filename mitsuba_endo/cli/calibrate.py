@@ -1,5 +1,6 @@
 """``mitsuba-endo calibrate``: from correspondence maps to a solution folder."""
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
 
 Maps = Annotated[
     list[Path],
-    typer.Argument(metavar="MAP", help="Correspondence maps, .exr or .npz, one per frame."),
+    typer.Argument(
+        metavar="MAP_OR_IMAGE",
+        help="Correspondence maps, .exr or .npz, one per frame; or images of the coded grid.",
+    ),
 ]
 RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: what is known and what is not.")]
 Out = Annotated[Path, typer.Option("--out", help="Solution folder to write.")]
@@ -42,6 +46,12 @@ Resume = Annotated[
 ]
 
 
+Pattern = Annotated[
+    str | None,
+    typer.Option(help="The pattern in the images; pattern:coded if not given.", show_default=False),
+]
+
+
 def calibrate(
     maps: Maps,
     rig: RigFile,
@@ -51,21 +61,29 @@ def calibrate(
     share: Share = None,
     seed: Seed = 0,
     resume: Resume = None,
+    pattern: Pattern = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Find projector pose, focal length and surface from correspondence maps."""
-    with session(quiet, as_json, debug) as output:
+    """Find projector pose, focal length and surface from correspondence maps.
+
+    Images of the coded grid are decoded first, as by the command decode; their maps and pictures
+    of the grids found go into the folder "decoded" of the solution.
+    """
+    with session(quiet, as_json, debug) as output, tempfile.TemporaryDirectory() as aside:
         from ..files import check_output_folder
         from ..records.checkpoint import load_checkpoint
         from ..solve.options import Options
+        from .decode import decode_images, keep_decoded
 
         check_output_folder(out)
         checkpoint = None if resume is None else load_checkpoint(resume)
-        frames, rig_record = load_input(maps, rig, share)
+        paths = decode_images(maps, rig, pattern, Path(aside), output)
+        frames, rig_record = load_input(paths, rig, share)
         options = Options(solver=solver, start=start, seed=seed)
         solution = solve_and_write(frames, rig_record, options, out, output, checkpoint)
+        keep_decoded(Path(aside), out)
         report(solution, out, output)
         raise typer.Exit(exit_code(solution))
 

@@ -1,5 +1,6 @@
 """``mitsuba-endo decode``: from images of the coded grid to correspondence maps."""
 
+import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ Pattern = Annotated[
 Weights = Annotated[
     Path | None, typer.Option(help="Another decoder network, as an ONNX file.", show_default=False)
 ]
+DEFAULT = "pattern:coded"
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def decode(
     images: Images,
     rig: RigFile,
     out: Out,
-    pattern: Pattern = "pattern:coded",
+    pattern: Pattern = DEFAULT,
     weights: Weights = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -113,6 +115,42 @@ def decode_into(
             found.append(Summary(frame.name, linked, placed, result.coverage, result.reason))
             _write(folder, frame, result)
     return found
+
+
+def decode_images(
+    paths: list[Path], rig_file: Path, pattern: str | None, aside: Path, output: Session
+) -> list[Path]:
+    """Return correspondence maps: those given, or those of the images given, written to ``aside``.
+
+    Raises:
+        InputError: maps and images at once, a pattern for maps, no pattern found in any image, or
+            as :func:`decode_into`.
+    """
+    from ..decode.image_files import is_images
+    from ..errors import InputError
+    from ..records.rig import load_rig
+
+    images = [path for path in paths if is_images(path)]
+    if not images:
+        if pattern is not None:
+            raise InputError("is for images, and maps are given", "--pattern", "leave it out")
+        return paths
+    if len(images) < len(paths):
+        raise InputError("maps and images are given", str(images[0]), "give one kind")
+    found = decode_into(aside, images, load_rig(rig_file), pattern or DEFAULT, None, output)
+    refuse_nothing(found)
+    output.print(*(one.line() for one in found))
+    return [map_path(aside, one.name) for one in found if not one.reason]
+
+
+def keep_decoded(aside: Path, solution: Path) -> None:
+    """Move what :func:`decode_images` wrote into the solution folder."""
+    from ..files import atomic_folder
+
+    if not any(aside.iterdir()):
+        return
+    with atomic_folder(solution / "decoded") as folder:
+        shutil.copytree(aside, folder, dirs_exist_ok=True)
 
 
 def refuse_nothing(found: Sequence[Summary]) -> None:

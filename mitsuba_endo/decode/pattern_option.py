@@ -6,7 +6,6 @@ from ..description import read_description
 from ..errors import InputError
 from .grid_pattern import CodedGrid
 
-DEFAULT = "pattern:coded"
 OPTION = "--pattern"
 
 
