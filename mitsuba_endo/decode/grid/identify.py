@@ -20,6 +20,9 @@ MIN_MARGIN = 6.0
 MIN_SHARE = 0.4
 """Of a component's nodes that must be placed, or else the whole of it is refused: the cut finds
 a few windows that fit in any grid, also in one with another code."""
+MIN_SHARE_OF_ALL = 0.25
+"""Of all components' nodes that must be placed, likewise: of many small components in a grid with
+another code, one or two fit by chance as a whole."""
 LARGE_PART = 60
 """Nodes of a part that speaks for itself."""
 LINK_COST = 2.0
@@ -60,11 +63,14 @@ def identify(graph: GridGraph, pattern: NDArray[np.int8]) -> Identity:
     """
     logs = evidence(graph.nodes.code)
     parts: list[_Part] = []
+    tried = 0
     for number in np.unique(graph.component[graph.component >= 0]):
         members = np.flatnonzero(graph.component == number)
         if len(members) >= MIN_NODES:
-            parts += _accepted(_parts(graph, members, logs, pattern), len(members))
-    parts = _same_way_up(parts)
+            tried += len(members)
+            found = _parts(graph, members, logs, pattern)
+            parts += _accepted(found, MIN_SHARE * len(members))
+    parts = _accepted(_same_way_up(parts), MIN_SHARE_OF_ALL * tried)
     return _without_doubles(graph, parts, logs, pattern)
 
 
@@ -109,12 +115,11 @@ def _within(links: Links, members: NDArray[np.intp], count: int) -> Links:
     return inside.chosen((start >= 0) & (end >= 0))
 
 
-def _accepted(parts: list[_Part], nodes: int) -> list[_Part]:
-    """Refuse a component of which too little is placed."""
+def _accepted(parts: list[_Part], needed: float) -> list[_Part]:
+    """Refuse parts that hold fewer nodes than needed, unless one of them is large."""
     placed = [len(part.members) for part in parts]
-    if sum(placed) >= MIN_SHARE * nodes or max(placed, default=0) >= LARGE_PART:
-        return parts
-    return []
+    enough = sum(placed) >= needed or max(placed, default=0) >= LARGE_PART
+    return parts if enough else []
 
 
 def _same_way_up(parts: list[_Part]) -> list[_Part]:
