@@ -147,7 +147,7 @@ def _shape(
         return "the truth is up to scale"
     if solution.units != "mm" and alignment in ("none", "rigid"):
         return f"the solution is up to scale, which alignment '{alignment}' leaves as it is"
-    frame_from_truth = _first_frame(truth, first[1])
+    frame_from_truth = first_from_truth(truth, first[1])
     if frame_from_truth is None:
         return "the true camera pose of the solution's first frame is null"
     found, true = (load_surface(path) for path in surfaces)
@@ -155,7 +155,7 @@ def _shape(
     return compare_shape(found, true, camera.to_model(), _lighting(truth, first[1]), alignment)
 
 
-def _first_frame(truth: Solution, frame: Frame) -> RigidTransform | None:
+def first_from_truth(truth: Solution, frame: Frame) -> RigidTransform | None:
     """Return the motion from the truth's first camera to that of ``frame``.
 
     The true surface is given in the truth's first camera, which the solution may have left out.

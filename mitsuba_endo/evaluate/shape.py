@@ -70,20 +70,11 @@ def compare_shape(
     Returns:
         The errors, mm, or a sentence saying why there are none.
     """
-    solution_caster = RayCaster(solution.vertices, solution.faces)
+    similarity = alignment_of(solution, truth, camera, alignment)
+    if isinstance(similarity, str):
+        return similarity
     truth_caster = RayCaster(truth.vertices, truth.faces)
     true_range = range_image(truth_caster, camera)
-    similarity = Similarity.identity()
-    if alignment != "none":
-        found = range_image(solution_caster, camera)
-        both = np.isfinite(found) & np.isfinite(true_range)
-        if np.count_nonzero(both) < 3:
-            return "no camera ray meets both surfaces, so they cannot be aligned"
-        rays = camera.rays(camera.pixel_grid())[both]
-        similarity = align_robustly(
-            rays * found[both, None], rays * true_range[both, None],
-            scale=alignment != "rigid", rotation=alignment != "scale",
-        )  # fmt: skip
     vertices = similarity.apply(solution.vertices)
     distance = distance_to_mesh(vertices[np.unique(solution.faces)], truth.vertices, truth.faces)
     found = range_image(RayCaster(vertices, solution.faces), camera)
@@ -96,6 +87,26 @@ def compare_shape(
         coverage=float(np.isfinite(found[wanted]).mean()) if wanted.any() else None,
         alignment_scale=similarity.scale,
     )
+
+
+def alignment_of(
+    solution: SurfaceEstimate, truth: SurfaceEstimate, camera: CameraModel, alignment: Alignment
+) -> Similarity | str:
+    """Return what an alignment does to the solution, or a sentence saying why it cannot be had.
+
+    Both surfaces are in the frame of ``camera``; see :func:`compare_shape`.
+    """
+    if alignment == "none":
+        return Similarity.identity()
+    found, true = (range_image(RayCaster(s.vertices, s.faces), camera) for s in (solution, truth))
+    both = np.isfinite(found) & np.isfinite(true)
+    if np.count_nonzero(both) < 3:
+        return "no camera ray meets both surfaces, so they cannot be aligned"
+    rays = camera.rays(camera.pixel_grid())[both]
+    return align_robustly(
+        rays * found[both, None], rays * true[both, None],
+        scale=alignment != "rigid", rotation=alignment != "scale",
+    )  # fmt: skip
 
 
 def _reached(

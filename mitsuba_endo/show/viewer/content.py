@@ -1,0 +1,106 @@
+"""What the viewer shows of a result; knows nothing of how it is drawn."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ...geometry.transforms import RigidTransform
+from ...records.calibration import Calibration, SurfaceEstimate
+from .. import surface_colours
+from ..figures import unit_name
+from ..places import REACH, Floats, Place, Rays, correspondence_rays, places
+from ..surface_colours import Shown
+from ..truth import Truth, load_truth, surface_error
+
+RAYS = 60
+"""Correspondences drawn for a frame."""
+
+
+@dataclass(eq=False)
+class Content:
+    """A calibration with what is derived from it for looking at."""
+
+    calibration: Calibration
+    truth: Truth | None = None
+    errors: list[Floats] | None = None
+    """Of every surface, from the truth; filled in by :meth:`compare`."""
+    _rays: dict[int, Rays | None] = field(default_factory=dict)
+
+    @cached_property
+    def places(self) -> list[Place]:
+        return places(self.calibration.solution)
+
+    @cached_property
+    def surfaces(self) -> list[SurfaceEstimate]:
+        """One for all frames, or one for each in its camera's frame."""
+        own = self.calibration.own_surfaces
+        return [self.calibration.surface, *(own[k] for k in sorted(own))]
+
+    @property
+    def unit(self) -> str:
+        return unit_name(self.calibration.solution)
+
+    @cached_property
+    def distance(self) -> float:
+        """Median distance of the first surface from its camera."""
+        return float(np.median(np.linalg.norm(self.calibration.surface.vertices, axis=-1)))
+
+    @property
+    def reach(self) -> float:
+        return REACH * self.distance
+
+    def surface_of(self, frame: int) -> int:
+        """Return the index of the surface that a frame sees."""
+        return frame if len(self.surfaces) > 1 else 0
+
+    def first_from_surface(self, surface: int) -> RigidTransform:
+        """Return where a surface lies in the first camera's frame."""
+        if len(self.surfaces) == 1:
+            return RigidTransform.identity()
+        return self.places[surface].first_from_camera or RigidTransform.identity()
+
+    def quantities(self) -> list[Shown]:
+        """Return what the surfaces can be coloured by, the most telling first."""
+        out = []
+        stds = [s.std for s in self.surfaces]
+        if all(std is not None for std in stds):
+            out.append(surface_colours.uncertainty([s for s in stds if s is not None], self.unit))
+        if self.errors is not None and self.truth is not None:
+            out.append(surface_colours.error(self.errors, self.unit, self.truth.alignment))
+        out.append(surface_colours.depth([s.vertices for s in self.surfaces], self.unit))
+        return out
+
+    def rays(self, frame: int) -> Rays | None:
+        """Return a sample of a frame's correspondences, None where its projector is unknown."""
+        if frame not in self._rays:
+            known = self.calibration
+            self._rays[frame] = correspondence_rays(
+                known.solution, known.camera, known.frames[frame], self.places[frame], RAYS
+            )
+        return self._rays[frame]
+
+    def compare(self, path: str | Path) -> None:
+        """Load a truth and compare the surfaces with it; starts Mitsuba.
+
+        Raises:
+            InputError: as :func:`load_truth`.
+        """
+        truth = load_truth(path, self.calibration)
+        errors = None
+        if truth.surface is not None:
+            errors = [
+                surface_error(surface, _seen_from(truth, k))
+                for k, surface in enumerate(self.surfaces)
+            ]
+        self.errors, self.truth = errors, truth
+
+
+def _seen_from(truth: Truth, frame: int) -> SurfaceEstimate:
+    """Return the true surface in the true frame of a frame's camera."""
+    assert truth.surface is not None
+    pose = truth.places[frame].first_from_camera
+    if frame == 0 or pose is None:
+        return truth.surface
+    return SurfaceEstimate(pose.inverse().apply(truth.surface.vertices), truth.surface.faces)

@@ -1,0 +1,167 @@
+"""The viewer's panel: what the user can choose, and what is said about the result."""
+
+import threading
+from dataclasses import replace
+from html import escape
+from typing import Any
+
+from ...records.calibration import Snapshot
+from ..figures import headline
+from .choice import Choice
+from .content import Content
+from .cost_chart import add_cost_chart, chart_data
+from .picking import Picker
+from .stage import Stage
+
+ALL = "all"
+
+
+class Controls:
+    """Connects the panel to the stage. viser calls back from several threads: one at a time."""
+
+    def __init__(self, server: Any, content: Content, stage: Stage) -> None:
+        self.server, self.content, self.stage = server, content, stage
+        self.choice = Choice(frame=0 if len(content.surfaces) > 1 else None)
+        self.picker = Picker(server, content)
+        self._lock = threading.RLock()
+        self._history = content.calibration.history
+        self._say_result()
+        self._add_show()
+        self._add_iterations()
+        self._add_measure()
+        self.change()
+
+    def change(self, **changes: Any) -> None:
+        """Change what is chosen and draw it."""
+        with self._lock:
+            self.choice = replace(self.choice, **changes)
+            self.stage.draw(self.choice)
+            self._legend.content = self._legend_text()
+            self._legend.visible = self.choice.snapshot is None and self.choice.surface
+
+    def truth_is_known(self) -> None:
+        """Offer what can be shown with the truth that the content now has."""
+        with self._lock:
+            self._colour.options = tuple(q.name for q in self.content.quantities())
+            self._truth.disabled = False
+            self._truth.hint = f"Truth in grey, from {self.content.truth.path}"  # type: ignore[union-attr]
+
+    def _say_result(self) -> None:
+        solution = self.content.calibration.solution
+        outcome, *facts = headline(solution).split("; ")
+        lines = [f"**{outcome}**", *facts]
+        self.server.gui.add_markdown("  \n".join(line.replace("_", " ") for line in lines))
+        if solution.verdict or solution.warnings:
+            with self.server.gui.add_folder("Verdict", expand_by_default=False):
+                said = [*solution.verdict, *(f"Warning: {w}" for w in solution.warnings)]
+                self.server.gui.add_markdown("\n".join(f"- {s}" for s in said))
+
+    def _add_show(self) -> None:
+        gui, content = self.server.gui, self.content
+        with gui.add_folder("Show"):
+            if len(content.places) > 1:
+                self._add_frames()
+            quantities = content.quantities()
+            self._colour = gui.add_dropdown(
+                "colour", [q.name for q in quantities], initial_value=quantities[0].name
+            )
+            self._colour.on_update(lambda _: self.change(colour=self._colour.value))
+            self._legend = gui.add_html("")
+            self._toggle("surface", "surface", True)
+            self._toggle("frusta", "frusta", True, "Blue: camera; orange: projector")
+            self._toggle(
+                "rays", "rays", False,
+                "Some correspondences: both rays of each, blue from the camera, orange from the "
+                "projector; where they end is where they pass most closely",
+            )  # fmt: skip
+            self._truth = self._toggle("truth", "truth", False, "No truth lies with this result")
+            self._truth.disabled = True
+
+    def _add_frames(self) -> None:
+        names = [place.name for place in self.content.places]
+        least = 1 if len(self.content.surfaces) > 1 else 0
+        slider = self.server.gui.add_slider("frame", least, len(names), 1, least)
+        told = self.server.gui.add_html("")
+
+        def choose(_: Any = None) -> None:
+            frame = None if slider.value == 0 else slider.value - 1
+            told.content = small(ALL if frame is None else names[frame])
+            self.change(frame=frame)
+
+        slider.on_update(choose)
+        told.content = small(names[0] if least else ALL)
+
+    def _toggle(self, label: str, field: str, value: bool, hint: str | None = None) -> Any:
+        box = self.server.gui.add_checkbox(label, value, hint=hint)
+        box.on_update(lambda _: self.change(**{field: box.value}))
+        return box
+
+    def _add_iterations(self) -> None:
+        history = self._history
+        if not history:
+            return
+        with self.server.gui.add_folder("Optimisation"):
+            last = len(history)
+            slider = self.server.gui.add_slider("step", 0, last, 1, last, hint="Last: the result")
+            told = self.server.gui.add_html(small("result"))
+            chart = add_cost_chart(self.server, history)
+
+        def choose(_: Any) -> None:
+            index = None if slider.value == last else int(slider.value)
+            told.content = small("result" if index is None else snapshot_words(history[index]))
+            chart.data = chart_data(history, index)
+            self.change(snapshot=index)
+
+        slider.on_update(choose)
+
+    def _add_measure(self) -> None:
+        gui = self.server.gui
+        with gui.add_folder("Measure"):
+            box = gui.add_checkbox("pick points", False)
+            self._told = gui.add_markdown(self.picker.words)
+            clear = gui.add_button("Clear")
+
+        def toggle(_: Any) -> None:
+            if box.value:
+                self.server.scene.on_click(self.clicked)
+            else:
+                self.server.scene.remove_click_callback(self.clicked)
+
+        box.on_update(toggle)
+        clear.on_click(lambda _: self._clear())
+
+    def clicked(self, event: Any) -> None:
+        """Pick a point where a click's ray meets the surface."""
+        with self._lock:
+            if self.choice.snapshot is None and self.choice.surface:
+                surfaces = self.stage.shown_surfaces(self.choice)
+                self.picker.add(event.ray_origin, event.ray_direction, surfaces)
+            else:
+                self.picker.words = "Show the result's surface first."
+            self._told.content = self.picker.words
+
+    def _clear(self) -> None:
+        with self._lock:
+            self.picker.clear()
+            self._told.content = self.picker.words
+
+    def _legend_text(self) -> str:
+        quantities = self.content.quantities()
+        named = [q for q in quantities if q.name == self.choice.colour]
+        return (named or quantities)[0].legend()
+
+
+def snapshot_words(snapshot: Snapshot) -> str:
+    """Say in one line what an iteration found."""
+    focal = sorted(set(snapshot.focal))
+    f = f"f = {focal[0]:.2f}" if len(focal) == 1 else f"f = {focal[0]:.1f} to {focal[-1]:.1f}"
+    cost = "start" if snapshot.cost is None else f"cost {snapshot.cost:.4g}"
+    return f"iteration {snapshot.iteration}: {cost}, {f} pattern px"
+
+
+def small(text: str) -> str:
+    """Return a line of small text as HTML of the panel."""
+    return (
+        '<div style="padding:0 14px 6px;font-size:12px;overflow-wrap:anywhere">'
+        f"{escape(text)}</div>"
+    )

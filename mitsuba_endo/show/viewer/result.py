@@ -1,0 +1,47 @@
+"""A finished result in the viewer."""
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...errors import InputError
+from ...records.calibration import Calibration
+from .content import Content
+from .controls import Controls
+from .stage import Stage
+
+
+@dataclass(frozen=True, eq=False)
+class Viewer:
+    """What is shown on a server."""
+
+    content: Content
+    stage: Stage
+    controls: Controls
+    comparison: threading.Thread | None = None
+    """Loads the truth; Mitsuba, which it needs, takes longer to start than the viewer."""
+    faults: list[str] | None = None
+    """Why there is no truth."""
+
+
+def open_viewer(server: Any, calibration: Calibration, truth: Path | None = None) -> Viewer:
+    """Show a result on a server of :func:`running_server`; the truth follows when it is loaded."""
+    content = Content(calibration)
+    stage = Stage(server, content)
+    controls = Controls(server, content, stage)
+    if truth is None:
+        return Viewer(content, stage, controls)
+    faults: list[str] = []
+
+    def compare() -> None:
+        try:
+            content.compare(truth)
+        except InputError as error:
+            faults.append(str(error))
+            return
+        controls.truth_is_known()
+
+    thread = threading.Thread(target=compare, name="truth")
+    thread.start()
+    return Viewer(content, stage, controls, thread, faults)
