@@ -15,6 +15,7 @@ from .export import export
 from .patterns import patterns
 from .render import render
 from .report import report
+from .view import view
 
 app = typer.Typer(
     name="mitsuba-endo",
@@ -32,6 +33,7 @@ COMMANDS = (
     calibrate,
     evaluate,
     report,
+    view,
     export,
 )
 for command in COMMANDS:
