@@ -6,6 +6,7 @@ import typer
 
 from .. import __version__
 from .calibrate import calibrate
+from .dataset import dataset
 from .decode import decode
 from .decode_stack import decode_stack
 from .demo import demo
@@ -32,6 +33,7 @@ COMMANDS = (
     decode_stack,
     calibrate,
     evaluate,
+    dataset,
     report,
     view,
     export,

@@ -1,5 +1,6 @@
 """The configuration of a dataset: what scenes, cameras, projectors and photographs to draw."""
 
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -74,7 +75,7 @@ DEFAULT_SCENES: list[dict[str, Any]] = [
     },
     {
         "kind": "rabbit",
-        "parameters": {"distance": [45, 75], "height": [45, 65], "yaw": [-3.14159, 3.14159]},
+        "parameters": {"distance": [45, 65], "height": [60, 90], "yaw": [-3.14159, 3.14159]},
     },
 ]  # fmt: skip
 
@@ -188,7 +189,7 @@ class Placing(Section):
 
     margin: PositiveFloat = 2.0
     """Least distance of camera and projector from the surface, mm."""
-    least_lit: Annotated[float, Field(gt=0, le=1)] = 0.25
+    least_lit: Annotated[float, Field(gt=0, le=1)] = 0.15
     """Least share of the image's pixels that the projector lights."""
     tries: PositiveInt = 200
     """Views drawn before the sample is given up and recorded as failed."""
@@ -201,7 +202,7 @@ class CameraRanges(Section):
     width: PositiveInt = 320
     height: PositiveInt = 240
     """Pixels, the same for all samples."""
-    fov: Degrees = uniform(65.0, 95.0)
+    fov: Degrees = uniform(55.0, 80.0)
     """From left to right without distortion."""
     aspect: Positive = uniform(0.995, 1.005)
     """fy / fx."""
@@ -241,7 +242,7 @@ class ProjectorRanges(Section):
     """The pattern projector in the endoscope's channel."""
 
     law: Names = choose("direction_cosine", "pinhole")
-    focal: Positive = uniform(260.0, 380.0)
+    focal: Positive = uniform(280.0, 380.0)
     """Pattern pixels."""
     centre: Number = uniform(-3.0, 3.0)
     """Principal point from the pattern's middle along each axis, pattern pixels."""
@@ -348,6 +349,11 @@ def load_config(path: str | Path | None) -> Config:
         for scene in config.scenes
     ]
     return config.model_copy(update={"scenes": scenes})
+
+
+def example_config() -> str:
+    """Return the packaged example: the built-in configuration, explained line by line."""
+    return resources.files("mitsuba_endo.dataset").joinpath("example.yaml").read_text(encoding="utf-8")
 
 
 def save_config(path: str | Path, config: Config) -> None:

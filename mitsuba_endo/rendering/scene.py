@@ -123,6 +123,19 @@ def load_scene(source: str | Path, **parameters: object) -> LoadedScene:
         InputError: no such file or scene, broken XML, a parameter that the scene has not, a
             description or value that Mitsuba refuses, or no camera or projector in the scene.
     """
+    scene, values = open_scene(source, **parameters)
+    loaded = LoadedScene(scene, str(source), values)
+    loaded.sensor()
+    loaded.emitter()
+    return loaded
+
+
+def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[str, str]]:
+    """Load a scene whatever is in it; return the ``mi.Scene`` and all its parameters' values.
+
+    Raises:
+        InputError: as :func:`load_scene`, which demands a camera and a projector besides.
+    """
     backend.ensure()
     from .untyped import mi
 
@@ -139,13 +152,9 @@ def load_scene(source: str | Path, **parameters: object) -> LoadedScene:
     with tempfile.TemporaryDirectory(prefix="mitsuba-endo-") as folder:
         resolved = {name: generate(name, value, Path(folder)) for name, value in values.items()}
         try:
-            scene = mi.load_file(str(path), **resolved)
+            return mi.load_file(str(path), **resolved), values
         except RuntimeError as error:
             raise InputError(_message(error), str(source), "correct the scene or value") from error
-    loaded = LoadedScene(scene, str(source), values)
-    loaded.sensor()
-    loaded.emitter()
-    return loaded
 
 
 def packaged_scenes() -> list[str]:

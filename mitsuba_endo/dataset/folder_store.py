@@ -1,0 +1,154 @@
+"""A dataset as a folder of files a sample: for people, and for the other commands."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..files import atomic_folder
+from ..records.calibration import SurfaceEstimate
+from ..records.correspondence import read_exr, save_map, write_exr
+from ..records.known_input import known_rig, save_rig
+from ..records.solution import save_solution
+from ..records.surface import load_surface, save_surface
+from ..records.validation import read_json
+from . import contents
+from .contents import Arrays
+from .digests import file_digest
+from .sample import MAP, Sample
+from .stored import Stored, numbered
+
+SAMPLES = "samples"
+DESCRIPTION = "sample.json"
+SURFACE = "truth_surface.ply"
+TRUTH = "truth.json"
+# The names within a sample's folder are those of `mitsuba-endo render`.
+CHANNELS = {
+    "image.exr": (contents.RADIANCE, ("R", "G", "B")),
+    "projector.exr": (contents.Q, ("projector.x", "projector.y")),
+    "depth.exr": (contents.DEPTH, ("Z",)),
+    "normals.exr": (contents.NORMALS, ("normal.x", "normal.y", "normal.z")),
+}
+GRID = "grid.exr"
+GRID_CHANNELS = {
+    contents.PHASE: ("phase.x", "phase.y"),
+    contents.NODE: ("node.x", "node.y"),
+    contents.CODE: ("code",),
+}
+MASKS = "masks.exr"
+TYPES = {contents.RADIANCE: np.float16, contents.NODE: np.int16, contents.CODE: np.int8}
+
+
+class FolderStore:
+    """``samples/000012/`` and so on: each absent or complete."""
+
+    def __init__(self, folder: str | Path) -> None:
+        self._folder = Path(folder) / SAMPLES
+
+    def write(self, sample: Sample, radiance: bool, surface: bool) -> None:
+        """Write a sample: it appears complete or not at all.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        arrays = contents.arrays_of(sample, radiance, surface)
+        with atomic_folder(self._path(sample.index)) as folder:
+            _write_image(folder / "image.png", arrays[contents.IMAGE])
+            save_map(folder / MAP, sample.maps.correspondences())
+            for name, (array, channels) in CHANNELS.items():
+                if array in arrays:
+                    write_exr(folder / name, _split(arrays[array], channels))
+            grid = [_split(arrays[array], names) for array, names in GRID_CHANNELS.items()]
+            write_exr(folder / GRID, {k: v for part in grid for k, v in part.items()})
+            write_exr(folder / MASKS, {name: arrays[name] for name in contents.MASKS})
+            save_rig(folder / "rig.yaml", known_rig(sample.truth))
+            truth = sample.truth.model_copy(update={"surface": SURFACE if surface else None})
+            save_solution(folder / TRUTH, truth)
+            if surface:
+                mesh = SurfaceEstimate(sample.mesh.vertices, sample.mesh.faces)
+                save_surface(folder / SURFACE, mesh)
+            sums = {p.name: file_digest(p) for p in sorted(folder.iterdir())}
+            described = {**sample.description, "sha256": sums}
+            (folder / DESCRIPTION).write_text(json.dumps(described, indent=1) + "\n", "utf-8")
+
+    def indices(self) -> set[int]:
+        """Return the numbers of the samples that are there."""
+        return numbered(self._folder, "")
+
+    def read(self, index: int) -> Stored:
+        """Read a sample back.
+
+        Raises:
+            InputError: a file of it is missing or damaged.
+        """
+        folder = self._path(index)
+        description = read_json(folder / DESCRIPTION)
+        arrays: Arrays = {contents.IMAGE: _read_image(folder / "image.png")}
+        for name, (array, channels) in CHANNELS.items():
+            if (folder / name).exists():
+                arrays[array] = _joined(read_exr(folder / name), channels)
+        grid = read_exr(folder / GRID)
+        arrays |= {array: _joined(grid, names) for array, names in GRID_CHANNELS.items()}
+        masks = read_exr(folder / MASKS)
+        arrays |= {name: masks[name] > 0 for name in contents.MASKS}
+        for name, kind in TYPES.items():
+            if name in arrays:
+                arrays[name] = arrays[name].astype(kind)
+        if (folder / SURFACE).exists():
+            mesh = load_surface(folder / SURFACE)
+            arrays[contents.VERTICES] = mesh.vertices.astype(np.float32)
+            arrays[contents.FACES] = mesh.faces.astype(np.uint32)
+        return Stored(description, arrays)
+
+    def settle(self, settled: set[int], last: bool) -> None:
+        """Do nothing: every sample is where it belongs as soon as it is written."""
+
+    def clear(self) -> None:
+        """Remove what a killed process left half written."""
+        if self._folder.exists():
+            for path in self._folder.iterdir():
+                if path.name.endswith((".partial", ".old")):
+                    shutil.rmtree(path, ignore_errors=True)
+
+    def manifest(self) -> list[dict[str, Any]]:
+        """Return every sample's kind and files with their checksums."""
+        listed = []
+        for index in sorted(self.indices()):
+            path = self._path(index)
+            described = read_json(path / DESCRIPTION)
+            sums = {**described["sha256"], DESCRIPTION: file_digest(path / DESCRIPTION)}
+            folder = f"{SAMPLES}/{path.name}"
+            listed.append(
+                {"index": index, "kind": described["kind"], "path": folder, "sha256": sums}
+            )
+        return listed
+
+    def _path(self, index: int) -> Path:
+        return self._folder / f"{index:06d}"
+
+
+def _split(array: NDArray[Any], channels: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    stacked = array[..., None] if array.ndim == 2 else array
+    return {name: stacked[..., i] for i, name in enumerate(channels)}
+
+
+def _joined(channels: dict[str, NDArray[np.float32]], names: tuple[str, ...]) -> NDArray[Any]:
+    stacked = np.stack([channels[name] for name in names], -1)
+    return stacked[..., 0] if len(names) == 1 else stacked
+
+
+def _write_image(path: Path, image: NDArray[Any]) -> None:
+    data = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)[1]
+    path.write_bytes(data.tobytes())
+
+
+def _read_image(path: Path) -> NDArray[Any]:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise InputError("is not a readable image", str(path), "make the sample again")
+    return np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image

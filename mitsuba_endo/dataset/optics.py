@@ -1,0 +1,91 @@
+"""Drawing cameras, projectors, and the projector's pose in the channel."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..geometry.cameras import CameraModel
+from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.transforms import RigidTransform
+from .config import CameraRanges, ProjectorRanges
+
+CAMERA_TRIES = 50
+ROUND_TRIP_PX = 0.05
+
+
+def draw_camera(ranges: CameraRanges, rng: np.random.Generator) -> CameraModel:
+    """Return a camera whose lens model can be inverted in the whole image.
+
+    Raises:
+        InputError: none was drawn; the distortion folds the image.
+    """
+    for _ in range(CAMERA_TRIES):
+        model = ranges.model.draw(rng)
+        half = np.radians(ranges.fov.draw(rng)) / 2
+        # Without distortion a fisheye's image grows with the angle, a lens's with its tangent.
+        fx = ranges.width / 2 / (half if model == "opencv_fisheye" else np.tan(half))
+        cx, cy = (
+            (size - 1) / 2 + ranges.centre.draw(rng) for size in (ranges.width, ranges.height)
+        )
+        K = np.array([[fx, 0, cx], [0, fx * ranges.aspect.draw(rng), cy], [0, 0, 1]])
+        distortion = tuple(float(k.draw(rng)) for k in ranges.distortion)
+        camera = CameraModel(model, ranges.width, ranges.height, K, distortion)
+        if _invertible(camera):
+            return camera
+    raise InputError(
+        f"folds the image's corners in {CAMERA_TRIES} of {CAMERA_TRIES} cameras",
+        "camera.distortion",
+        "narrow the range of its coefficients, or of fov",
+    )
+
+
+def _invertible(camera: CameraModel) -> bool:
+    pixels = camera.pixel_grid()
+    border = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
+    with np.errstate(all="ignore"):
+        again = camera.project(camera.rays(border))
+    return bool((np.abs(again - border) < ROUND_TRIP_PX).all())
+
+
+def draw_projector(
+    ranges: ProjectorRanges, size: tuple[int, int], rng: np.random.Generator
+) -> ProjectorModel:
+    """Return a projector for a pattern of this width and height, pattern pixels."""
+    centre = [(n - 1) / 2 + ranges.centre.draw(rng) for n in size]
+    distortion = [float(k.draw(rng)) for k in ranges.distortion]
+    return projector_model(
+        ranges.law.draw(rng), ranges.focal.draw(rng), centre, ranges.aspect.draw(rng), distortion
+    )
+
+
+@dataclass(frozen=True)
+class ProjectorDraw:
+    """The channel of one endoscope, in which the projector's pose is drawn."""
+
+    ranges: ProjectorRanges
+
+    def pose(self, rng: np.random.Generator) -> RigidTransform:
+        """Return a drawn projector_from_camera, mm."""
+        ranges = self.ranges
+        bearing = np.radians(ranges.bearing.draw(rng))
+        baseline = ranges.baseline.draw(rng)
+        place = np.array(
+            [baseline * np.cos(bearing), baseline * np.sin(bearing), ranges.ahead.draw(rng)]
+        )
+        towards = np.array([0.0, 0.0, place[2] + ranges.meeting.draw(rng)]) - place
+        angles = [ranges.tilt.draw(rng), ranges.tilt.draw(rng), ranges.roll.draw(rng)]
+        turn: Any = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
+        return RigidTransform(_swung(towards) @ turn, place).inverse()
+
+
+def _swung(axis: np.ndarray) -> np.ndarray:
+    """Return the smallest rotation (3, 3) that takes +z to ``axis`` (3,)."""
+    unit = axis / np.linalg.norm(axis)
+    about = np.cross([0.0, 0.0, 1.0], unit)
+    sine = np.linalg.norm(about)
+    if sine < 1e-12:
+        return np.eye(3)
+    return Rotation.from_rotvec(about / sine * np.arctan2(sine, unit[2])).as_matrix()

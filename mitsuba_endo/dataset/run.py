@@ -1,0 +1,217 @@
+"""Making a dataset: what is there already stays, what is missing is made."""
+
+import contextlib
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..errors import InputError
+from ..files import atomic_path
+from ..records.validation import read_json
+from .config import FILE, Config
+from .digests import array_digest
+from .lock import locked
+from .stored import Store, numbered
+from .work import Job, Result
+
+SCHEMA = 1
+DATASET, MANIFEST, FAILED = "dataset.json", "manifest.json", "failed"
+PACKAGES = ("mitsuba-endo", "mitsuba", "drjit", "numpy")
+
+Advance = Callable[["Progress"], None]
+
+
+class Pool(Protocol):
+    """Somebody who makes samples."""
+
+    def run(self, indices: Iterable[int]) -> Iterator[Result]:
+        """Yield a result for every number, in the order of completion."""
+        ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run has come."""
+
+    done: int
+    """Samples that exist, those of earlier runs included."""
+    failed: int
+    count: int
+    """Samples wanted."""
+    rate: float
+    """Samples per second of this run, failed ones included; 0 before the first."""
+
+    @property
+    def seconds_left(self) -> float | None:
+        """How long the rest takes at this rate; None before the first sample."""
+        return (self.count - self.done - self.failed) / self.rate if self.rate else None
+
+
+def make_dataset(
+    config: Config,
+    out: str | Path,
+    count: int,
+    pool: Callable[[Job], Pool],
+    advance: Advance = lambda progress: None,
+    retry_failed: bool = False,
+) -> Progress:
+    """Make samples 0 to count - 1, or those of them that are not yet there.
+
+    Args:
+        config: what to draw.
+        out: folder; new, empty, or with a dataset begun with the same configuration.
+        count: samples wanted; those that fail are recorded and not replaced.
+        pool: makes the workers.
+        advance: called after every sample.
+        retry_failed: whether to try failed samples of earlier runs again.
+
+    Raises:
+        InputError: the folder cannot be used or written, it was begun with another
+            configuration, or a surface that the user gives is unusable.
+    """
+    out = Path(out).absolute()
+    job = Job(config, str(out))
+    began = _open_folder(out)
+    with locked(out):
+        _begin(job, out, count, began)
+        store = job.store()
+        store.clear()
+        if retry_failed:
+            shutil.rmtree(out / FAILED, ignore_errors=True)
+        try:
+            progress = _make_missing(job, store, count, pool, advance)
+        except BaseException:
+            # After an interruption, too, the manifest lists what is there, if it can be written.
+            with contextlib.suppress(InputError, OSError):
+                _close(store, out)
+            raise
+        _close(store, out)
+        shutil.rmtree(job.workshop(), ignore_errors=True)
+    return progress
+
+
+def _make_missing(
+    job: Job, store: Store, count: int, pool: Callable[[Job], Pool], advance: Advance
+) -> Progress:
+    wanted = range(count)
+    done = store.indices().intersection(wanted)
+    failed = numbered(Path(job.out) / FAILED, ".json").intersection(wanted) - done
+    missing = sorted(set(wanted) - done - failed)
+    started, before = time.monotonic(), count - len(missing)
+    progress = Progress(len(done), len(failed), count, 0.0)
+    advance(progress)
+    if missing:
+        for result in pool(job).run(missing):
+            if result.status == "stop":
+                raise InputError(
+                    f"{result.reason.rstrip('.')}; {len(done)} of {count} samples are kept",
+                    todo="make room, then run the same command again to go on",
+                )
+            if result.status == "done":
+                done.add(result.index)
+            else:
+                failed.add(result.index)
+                _record_failure(job, result)
+            store.settle(done | failed, last=False)
+            rate = (len(done) + len(failed) - before) / (time.monotonic() - started)
+            progress = Progress(len(done), len(failed), count, rate)
+            advance(progress)
+    store.settle(done | failed, last=True)
+    return progress
+
+
+def _record_failure(job: Job, result: Result) -> None:
+    record = {"index": result.index, "seed": job.config.seed, "status": result.status,
+              "reason": result.reason}  # fmt: skip
+    _write_json(Path(job.out) / FAILED / f"{result.index:06d}.json", record)
+
+
+def failures(out: str | Path) -> list[dict[str, Any]]:
+    """Return the records of failed samples."""
+    folder = Path(out) / FAILED
+    return [read_json(folder / f"{index:06d}.json") for index in sorted(numbered(folder, ".json"))]
+
+
+def _open_folder(out: Path) -> dict[str, Any] | None:
+    """Make the folder, or return what it was begun with."""
+    if (out / DATASET).is_file():
+        return read_json(out / DATASET)
+    if out.exists() and not out.is_dir():
+        raise InputError("exists and is not a folder", str(out), "choose another output folder")
+    if out.is_dir() and any(path.name != ".lock" for path in out.iterdir()):
+        raise InputError("holds files that are no dataset", str(out), "choose an empty folder")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(
+            f"cannot be made ({reason})", str(out), "choose a folder you may write to"
+        ) from error
+    return None
+
+
+def _begin(job: Job, out: Path, count: int, began: dict[str, Any] | None) -> None:
+    """Prepare what samples share, and write down, or compare, what the dataset is made of."""
+    job.workshop().mkdir(exist_ok=True)
+    wanted = {
+        "schema": SCHEMA,
+        "units": "mm",
+        "config": job.config.model_dump(mode="json"),
+        "surfaces": _prepare_surfaces(job),
+        "versions": {name: metadata.version(name) for name in PACKAGES},
+    }
+    if began is not None:
+        began = {key: value for key, value in began.items() if key != "count"}
+        difference = _difference(began, json.loads(json.dumps(wanted)))
+        if difference:
+            raise InputError(
+                f"was begun with another {difference}", str(out / DATASET),
+                "choose another folder, or the same settings to go on",
+            )  # fmt: skip
+    _write_json(out / DATASET, {**wanted, "count": count})
+
+
+def _prepare_surfaces(job: Job) -> dict[str, Any]:
+    """Check the surfaces that the user gives and keep them for the workers."""
+    from .workshop import given_path, save_mesh
+
+    noted = {}
+    for number, scene in enumerate(job.config.scenes):
+        if scene.kind == FILE:
+            from .given import note, prepare_given
+
+            mesh = prepare_given(scene)
+            save_mesh(given_path(job.workshop(), number), mesh)
+            sums = array_digest(mesh.vertices), array_digest(mesh.faces)
+            noted[str(number)] = {"file": scene.file, **note(mesh), "sha256": sums}
+    return noted
+
+
+def _difference(a: Any, b: Any, where: str = "") -> str | None:
+    """Return the first place at which two JSON values differ."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        for key in [*a, *(k for k in b if k not in a)]:
+            if key not in a or key not in b:
+                return f"{where}{key}"
+            found = _difference(a[key], b[key], f"{where}{key}.")
+            if found:
+                return found
+        return None
+    return None if a == b else where.rstrip(".")
+
+
+def _close(store: Store, out: Path) -> None:
+    """Remove what is half written and list what is there."""
+    store.clear()
+    record = {"schema": SCHEMA, "samples": store.manifest(), "failed": failures(out)}
+    _write_json(out / MANIFEST, record)
+
+
+def _write_json(path: Path, data: dict[str, Any]) -> None:
+    with atomic_path(path) as aside:
+        aside.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

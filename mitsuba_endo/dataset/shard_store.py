@@ -1,0 +1,165 @@
+"""A dataset as HDF5 shards: for training."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..files import atomic_path
+from ..records.solution import Solution
+from . import contents
+from .digests import array_digest, file_digest, text_digest
+from .sample import Sample
+from .stored import Stored, numbered
+
+STAGING = "staging"
+SHARDS = "shards"
+SUFFIX = ".h5"
+DESCRIPTION, TRUTH = "sample.json", "truth.json"
+
+
+def hdf5() -> Any:
+    """Return the module h5py.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        import h5py  # pyright: ignore[reportMissingImports]
+    except ImportError:
+        raise InputError(
+            "HDF5 needs the package h5py", "format", 'pip install "mitsuba-endo[dataset]"'
+        ) from None
+    return h5py
+
+
+class ShardStore:
+    """``shards/000003.h5`` holds samples 3 n to 4 n - 1, one group each.
+
+    Workers write samples into ``staging/``; when all samples of a shard are settled they are
+    copied into it, and it appears complete. The same samples give the same bytes.
+    """
+
+    def __init__(self, folder: str | Path, per_shard: int) -> None:
+        self._staging, self._shards = Path(folder) / STAGING, Path(folder) / SHARDS
+        self._per_shard = per_shard
+
+    def write(self, sample: Sample, radiance: bool, surface: bool) -> None:
+        """Stage a sample: it appears complete or not at all.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        arrays = contents.arrays_of(sample, radiance, surface)
+        with atomic_path(self._staged(sample.index)) as aside, hdf5().File(aside, "w") as file:
+            group = file.create_group(_name(sample.index))
+            for name, array in arrays.items():
+                # One chunk an array: a sample is read as a whole.
+                group.create_dataset(name, data=array, chunks=array.shape, compression="lzf",
+                                     shuffle=True)  # fmt: skip
+            group[TRUTH] = sample.truth.model_dump_json(by_alias=True)
+            sums = {name: array_digest(array) for name, array in arrays.items()}
+            sums[TRUTH] = text_digest(group[TRUTH].asstr()[()])
+            group[DESCRIPTION] = json.dumps({**sample.description, "sha256": sums})
+
+    def indices(self) -> set[int]:
+        """Return the numbers of the samples that are there, staged or in shards."""
+        return numbered(self._staging, SUFFIX).union(*map(self._within, self._numbers()))
+
+    def read(self, index: int) -> Stored:
+        """Read a sample back.
+
+        Raises:
+            InputError: it is missing or damaged.
+        """
+        staged = self._staged(index)
+        path = staged if staged.exists() else self._shard(index // self._per_shard)
+        try:
+            with hdf5().File(path, "r") as file:
+                group = file[_name(index)]
+                texts = (DESCRIPTION, TRUTH)
+                arrays = {name: group[name][()] for name in group if name not in texts}
+                return Stored(json.loads(group[DESCRIPTION].asstr()[()]), arrays)
+        except (OSError, KeyError):
+            raise InputError(
+                f"has no readable sample {index}", str(path), "make it again"
+            ) from None
+
+    def read_truth(self, index: int) -> Solution:
+        """Return a sample's exact calibration."""
+        staged = self._staged(index)
+        path = staged if staged.exists() else self._shard(index // self._per_shard)
+        with hdf5().File(path, "r") as file:
+            return Solution.model_validate_json(file[_name(index)][TRUTH].asstr()[()])
+
+    def settle(self, settled: set[int], last: bool) -> None:
+        """Seal the shards of which all samples are settled, or all if none follows."""
+        staged = numbered(self._staging, SUFFIX)
+        for number in sorted({index // self._per_shard for index in staged}):
+            members = range(number * self._per_shard, (number + 1) * self._per_shard)
+            if last or settled.issuperset(members):
+                self._seal(number, sorted(staged.intersection(members)))
+
+    def clear(self) -> None:
+        """Remove what a killed process left half written, and staged copies of sealed samples."""
+        for folder in (self._staging, self._shards):
+            for path in folder.glob(".*.partial*"):
+                path.unlink(missing_ok=True)
+        sealed = set().union(*map(self._within, self._numbers()))
+        for index in numbered(self._staging, SUFFIX) & sealed:
+            self._staged(index).unlink()
+
+    def manifest(self) -> list[dict[str, Any]]:
+        """Return every shard with its checksum and samples."""
+        return [
+            {
+                "path": f"{SHARDS}/{self._shard(number).name}",
+                "sha256": file_digest(self._shard(number)),
+                "samples": sorted(self._within(number)),
+            }
+            for number in sorted(self._numbers())
+        ]
+
+    def _seal(self, number: int, staged: list[int]) -> None:
+        """Write a shard from what it already holds and the staged samples, then remove these."""
+        h5py, path = hdf5(), self._shard(number)
+        held = self._within(number)
+        with atomic_path(path) as aside, h5py.File(aside, "w") as file:
+            for index in sorted({*held, *staged}):
+                source = self._staged(index) if index in staged else path
+                with h5py.File(source, "r") as old:
+                    old.copy(old[_name(index)], file, _name(index))
+        for index in staged:
+            self._staged(index).unlink()
+        if not any(self._staging.iterdir()):
+            self._staging.rmdir()
+
+    def _numbers(self) -> set[int]:
+        return numbered(self._shards, SUFFIX)
+
+    def _within(self, number: int) -> set[int]:
+        """Return the samples in a shard.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        path = self._shard(number)
+        if not path.exists():
+            return set()
+        try:
+            with hdf5().File(path, "r") as file:
+                return {int(name) for name in file}
+        except OSError:
+            raise InputError(
+                "is damaged", str(path), "remove it: its samples are made again"
+            ) from None
+
+    def _staged(self, index: int) -> Path:
+        return self._staging / f"{_name(index)}{SUFFIX}"
+
+    def _shard(self, number: int) -> Path:
+        return self._shards / f"{number:06d}{SUFFIX}"
+
+
+def _name(index: int) -> str:
+    return f"{index:06d}"
