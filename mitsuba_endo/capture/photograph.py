@@ -55,11 +55,11 @@ def photograph(
         pattern_size: width and height in pattern pixels. Default: those of ``pattern``.
     """
     backend.ensure()
-    from .studio import Studio
+    from .studio import SetUp, trace
 
-    studio = Studio(mesh, camera, world_from_camera, projector, projector_from_camera, pattern,
-                    settings, pattern_size)  # fmt: skip
-    laser, lamp = studio.render(settings.spp, seed)
+    size = pattern_size or (pattern.shape[1], pattern.shape[0])
+    setup = SetUp(mesh, camera, world_from_camera, projector, projector_from_camera, pattern, size)
+    laser, lamp = trace(setup, settings, seed)
     radiance = laser + lamp
     image = apply_effects(
         radiance, settings.effects, seed, laser=laser, cosine=cosine_to_axis(camera)

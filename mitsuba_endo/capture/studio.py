@@ -1,5 +1,6 @@
-"""The Mitsuba scene of a photograph: mesh, tissue, camera, projector and lamp."""
+"""The Mitsuba scenes of a photograph: mesh, tissue, camera, projector and lamp."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,82 +11,133 @@ from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..rendering import keys
 from ..rendering.axes import to_world_from_pose
-from ..rendering.untyped import mi
+from ..rendering.rays import pixel_rays
+from ..rendering.untyped import dr, mi
 from ..shapes.mesh import Mesh
-from .settings import CaptureSettings, Tissue
+from .materials import dry_tissue, index_of_refraction, translucent_tissue, wet_surface, wet_tissue
+from .settings import CaptureSettings
+from .subsurface_blur import subsurface_blur
 
-LAMP = "lamp"
+LAMP_SAMPLES = 4
+"""The lamp's light has no fine lines: it gets so many times fewer samples than the laser's."""
+_LONGEST_WALK = 256
+"""Scatterings inside the tissue; at an albedo of 0.99 8 % of the light lives longer."""
 
 
-class Studio:
-    """One set-up, rendered once for the laser and once for the lamp."""
+@dataclass(frozen=True, eq=False)
+class SetUp:
+    """Geometry of one photograph; poses have OpenCV axes."""
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        camera: CameraModel,
-        world_from_camera: RigidTransform,
-        projector: ProjectorModel,
-        projector_from_camera: RigidTransform,
-        pattern: NDArray[np.float32],
-        settings: CaptureSettings,
-        pattern_size: tuple[int, int] | None,
-    ) -> None:
-        size = pattern_size or (pattern.shape[1], pattern.shape[0])
-        world_from_projector = world_from_camera @ projector_from_camera.inverse()
-        light = settings.light
-        common = {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": settings.max_depth},
-            keys.CAMERA: _sensor(camera, world_from_camera),
-            keys.SURFACE: _surface(mesh, settings.tissue),
-        }
-        self._laser: Any = mi.load_dict(common | {keys.PROJECTOR: _projector(
-            projector, world_from_projector, pattern, size, light.projector_power)})  # fmt: skip
-        self._lamp: Any = None
-        if light.lamp:
-            intensity = light.lamp * light.projector_power * _mean_density(projector, size)
-            self._lamp = mi.load_dict(common | _lamps(
-                world_from_camera, light.lamp_offset, intensity * np.array(light.lamp_color)
-            ))  # fmt: skip
+    mesh: Mesh
+    """In the world, mm."""
+    camera: CameraModel
+    world_from_camera: RigidTransform
+    projector: ProjectorModel
+    projector_from_camera: RigidTransform
+    pattern: NDArray[np.float32]
+    """(H, W, 3) linear RGB."""
+    pattern_size: tuple[int, int]
+    """Width and height, pattern pixels."""
 
-    def render(self, spp: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the radiance (h, w, 3) by the laser and by the lamp."""
-        laser = np.array(mi.render(self._laser, spp=spp, seed=2 * seed), np.float32)[..., :3]
-        if self._lamp is None:
-            return laser, np.zeros_like(laser)
-        lamp = np.array(mi.render(self._lamp, spp=spp, seed=2 * seed + 1), np.float32)[..., :3]
-        return laser, lamp
+
+def trace(
+    setup: SetUp, settings: CaptureSettings, seed: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the radiance (h, w, 3) by the laser and by the lamp, each from a pass of its own.
+
+    A pass for each light, because speckle belongs to the laser, and because the path tracer
+    chooses one light at random at every reflection, which would turn two into noise.
+    """
+    light = settings.light
+    laser = {keys.PROJECTOR: _projector(setup, light.projector_power)}
+    by_laser = _render(setup, settings, laser, settings.spp, 2 * seed)
+    if not light.lamp:
+        return by_laser, np.zeros_like(by_laser)
+    intensity = light.lamp * light.projector_power * mean_intensity(setup)
+    lamps = _lamps(setup, light.lamp_offset, intensity * np.array(light.lamp_color))
+    spp = max(1, settings.spp // LAMP_SAMPLES)
+    return by_laser, _render(setup, settings, lamps, spp, 2 * seed + 1)
+
+
+def mean_intensity(setup: SetUp) -> float:
+    """Return the share of the power per steradian, on the axis, that a uniform pattern has."""
+    on_axis = setup.projector.density_xyz(np.zeros(1), np.zeros(1), np.ones(1))
+    return float(on_axis[0]) / (setup.pattern_size[0] * setup.pattern_size[1])
+
+
+def _render(
+    setup: SetUp, settings: CaptureSettings, lights: dict[str, Any], spp: int, seed: int
+) -> NDArray[np.float32]:
+    tissue = settings.tissue
+    path = {"type": "path", "max_depth": settings.max_depth}
+    if tissue.subsurface == "medium":
+        boundary, medium = translucent_tissue(tissue)
+        walk = {"type": "volpath", "max_depth": _LONGEST_WALK}
+        return _image(_scene(setup, boundary, walk, lights, medium), spp, seed)
+    if tissue.subsurface == "none":
+        return _image(_scene(setup, wet_tissue(tissue), path, lights), spp, seed)
+    inside = _scene(setup, dry_tissue(tissue), path, lights)
+    points, pixels_per_mm = _seen(inside, setup)
+    entered = subsurface_blur(
+        _image(inside, spp, seed), points, pixels_per_mm, tissue.mean_free_path, tissue.base_color,
+        index_of_refraction(tissue.specular),
+    )  # fmt: skip
+    direct = {"type": "path", "max_depth": 2}
+    return entered + _image(_scene(setup, wet_surface(tissue), direct, lights), spp, seed)
+
+
+def _image(scene: Any, spp: int, seed: int) -> NDArray[np.float32]:
+    return np.array(mi.render(scene, spp=spp, seed=seed), np.float32)[..., :3]
+
+
+def _seen(scene: Any, setup: SetUp) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the points (h, w, 3) that pixels see, mm, NaN = none, and pixels per mm (h, w)."""
+    ray, width, height = pixel_rays(scene.sensors()[0])
+    si = scene.ray_intersect_preliminary(ray, coherent=True)
+    distance = dr.select(si.is_valid(), si.t, dr.nan)
+    points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
+    along = np.array(distance, np.float32).reshape(height, width)
+    return points, np.float32(setup.camera.K[0, 0]) / along
+
+
+def _scene(
+    setup: SetUp,
+    bsdf: dict[str, Any],
+    integrator: dict[str, Any],
+    lights: dict[str, Any],
+    medium: dict[str, Any] | None = None,
+) -> Any:
+    return mi.load_dict({
+        "type": "scene", "integrator": integrator, keys.CAMERA: _sensor(setup),
+        keys.SURFACE: _surface(setup.mesh, bsdf, medium), **lights,
+    })  # fmt: skip
 
 
 def _pose(world_from_object: RigidTransform) -> Any:
     return mi.ScalarTransform4f(to_world_from_pose(world_from_object).tolist())
 
 
-def _sensor(camera: CameraModel, world_from_camera: RigidTransform) -> dict[str, Any]:
+def _sensor(setup: SetUp) -> dict[str, Any]:
+    camera, K = setup.camera, setup.camera.K
     film = {"type": "hdrfilm", "width": camera.width, "height": camera.height,
             "rfilter": {"type": "box"}, "pixel_format": "rgb"}  # fmt: skip
     lens = dict(zip(keys.LENSES[camera.model], (float(k) for k in camera.distortion), strict=False))
-    K = camera.K
     return {
-        "type": "endoscope", "model": camera.model, "to_world": _pose(world_from_camera),
+        "type": "endoscope", "model": camera.model, "to_world": _pose(setup.world_from_camera),
         "fx": float(K[0, 0]), "fy": float(K[1, 1]), "cx": float(K[0, 2]), "cy": float(K[1, 2]),
         "film": film, **lens,
     }  # fmt: skip
 
 
-def _projector(
-    projector: ProjectorModel,
-    world_from_projector: RigidTransform,
-    pattern: NDArray[np.float32],
-    size: tuple[int, int],
-    power: float,
-) -> dict[str, Any]:
-    image = np.ascontiguousarray(pattern, np.float32)
+def _projector(setup: SetUp, power: float) -> dict[str, Any]:
+    projector = setup.projector
+    image = np.ascontiguousarray(setup.pattern, np.float32)
+    width, height = setup.pattern_size
+    world_from_projector = setup.world_from_camera @ setup.projector_from_camera.inverse()
     coefficients = (float(k) for k in projector.distortion.coefficients)
     return {
         "type": "doe_projector", "law": projector.law, "to_world": _pose(world_from_projector),
-        "width": size[0], "height": size[1], "focal": float(projector.focal),
+        "width": width, "height": height, "focal": float(projector.focal),
         "centre_x": float(projector.centre[0]), "centre_y": float(projector.centre[1]),
         "aspect": float(projector.aspect), "power": power,
         "pattern": {"type": "bitmap", "bitmap": mi.Bitmap(image), "raw": True,
@@ -94,20 +146,11 @@ def _projector(
     }  # fmt: skip
 
 
-def _mean_density(projector: ProjectorModel, size: tuple[int, int]) -> float:
-    """Return the share of the pattern's power per steradian on the axis of a uniform pattern."""
-    return float(projector.density_xyz(np.zeros(1), np.zeros(1), np.ones(1))[0]) / (
-        size[0] * size[1]
-    )
-
-
-def _lamps(
-    world_from_camera: RigidTransform, offset: float, intensity: NDArray[np.float64]
-) -> dict[str, Any]:
+def _lamps(setup: SetUp, offset: float, intensity: NDArray[np.float64]) -> dict[str, Any]:
     """Return two light guides beside the lens that share the intensity (3,)."""
-    ends = world_from_camera.apply(np.array([[-offset, 0.0, 0.0], [offset, 0.0, 0.0]]))
+    ends = setup.world_from_camera.apply(np.array([[-offset, 0.0, 0.0], [offset, 0.0, 0.0]]))
     return {
-        f"{LAMP}_{i}": {
+        f"{keys.LAMP}_{i}": {
             "type": "point", "position": end.tolist(),
             "intensity": {"type": "rgb", "value": (intensity / 2).tolist()},
         }
@@ -115,9 +158,11 @@ def _lamps(
     }  # fmt: skip
 
 
-def _surface(mesh: Mesh, tissue: Tissue) -> Any:
+def _surface(mesh: Mesh, bsdf: dict[str, Any], medium: dict[str, Any] | None) -> Any:
     props = mi.Properties()
-    props["mesh_bsdf"] = mi.load_dict(_bsdf(tissue))
+    props["material"] = mi.load_dict(bsdf)
+    if medium is not None:
+        props["interior"] = mi.load_dict(medium)
     surface: Any = mi.Mesh(
         keys.SURFACE, len(mesh.vertices), len(mesh.faces), props=props, has_vertex_normals=True
     )
@@ -126,23 +171,3 @@ def _surface(mesh: Mesh, tissue: Tissue) -> Any:
     parameters[keys.VERTEX_POSITIONS] = mesh.vertices.astype(np.float32).ravel()
     parameters.update()
     return surface
-
-
-def _bsdf(tissue: Tissue) -> dict[str, Any]:
-    wet: dict[str, Any] = {
-        "type": "principled", "base_color": _colour(tissue),
-        "roughness": tissue.roughness, "specular": tissue.specular,
-        "clearcoat": tissue.clearcoat, "clearcoat_gloss": tissue.clearcoat_gloss,
-    }  # fmt: skip
-    if tissue.relief:
-        fine = {"type": "tissue_relief", "slope": tissue.relief, "seed": tissue.seed}
-        wet = {"type": "bumpmap", "relief": fine, "bsdf": wet}
-    return {"type": "twosided", "bsdf": wet}
-
-
-def _colour(tissue: Tissue) -> dict[str, Any]:
-    base = {"type": "rgb", "value": list(tissue.base_color)}
-    if not tissue.vessel_contrast:
-        return base
-    return {"type": "vessels", "base": base, "contrast": tissue.vessel_contrast,
-            "scale": tissue.vessel_scale, "seed": tissue.seed}  # fmt: skip

@@ -9,6 +9,8 @@ PROJECTOR = "projector"
 """Id of the ``doe_projector`` emitter."""
 SURFACE = "surface"
 """Id of the mesh that is seen, and solved for."""
+LAMP = "lamp"
+"""Beginning of the ids of the endoscope's own light guides."""
 
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 """Names of the projector's distortion, in OpenCV's order."""
