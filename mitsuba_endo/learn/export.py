@@ -1,0 +1,44 @@
+"""From a trained network to an ONNX file that runs without PyTorch."""
+
+import copy
+import warnings
+from pathlib import Path
+
+import onnx  # pyright: ignore[reportMissingImports]
+import torch
+from torch import nn
+
+from ..decode.normalise import INPUT_CHANNELS
+from ..files import atomic_path
+from .model import CHANNELS, STRIDE
+
+OPSET = 17
+"""Read by onnxruntime from 1.12 and by OpenCV."""
+
+
+def export_onnx(network: nn.Module, path: Path, notes: dict[str, str]) -> None:
+    """Write the network as ONNX: ``image`` (1, 2, H, W) to ``heads`` (1, 9, H, W), any H and W
+    that are multiples of 16.
+
+    The metadata holds the names of the output's channels, comma-separated, as ``channels``, the
+    multiple as ``stride``, and the notes.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    still = copy.deepcopy(network).to("cpu").float().eval()
+    example = torch.zeros(1, INPUT_CHANNELS, 4 * STRIDE, 6 * STRIDE)
+    sizes = {2: "height", 3: "width"}
+    with atomic_path(path) as aside:
+        with warnings.catch_warnings():
+            # The successor rewrites the graph into operations that OpenCV does not know.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            torch.onnx.export(
+                still, (example,), aside, input_names=["image"], output_names=["heads"],
+                dynamic_axes={"image": sizes, "heads": sizes}, opset_version=OPSET, dynamo=False,
+            )  # fmt: skip
+        model = onnx.load(aside)
+        values = {"channels": ",".join(CHANNELS), "stride": str(STRIDE), **notes}
+        onnx.helper.set_model_props(model, values)
+        onnx.checker.check_model(model)
+        onnx.save(model, aside)

@@ -1,0 +1,78 @@
+"""How good the network is, per pixel, before graph and vote."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compose import Truth
+
+CONFIDENT = 0.5
+GROSS = 0.25
+"""Periods of error of a pixel that misleads the graph."""
+EDGE_FOUND = 0.5
+
+
+@dataclass(frozen=True)
+class PixelMetrics:
+    """Errors are per axis, in grid periods, over the accepted pixels of all images together."""
+
+    median: float
+    p95: float
+    gross: float
+    """Share of accepted pixels with an error above a quarter period on either axis."""
+    coverage: float
+    """Accepted share of the lit pixels."""
+    code_right: float
+    """Share of right codes, at lit pixels near nodes."""
+    false_share: float
+    """Accepted share of the pixels that the grid does not light."""
+    edge_recall: float
+    edge_precision: float
+
+    @classmethod
+    def names(cls) -> list[str]:
+        return [f.name for f in fields(cls)]
+
+
+def pixel_metrics(outputs: Sequence[NDArray[np.float32]], truths: Sequence[Truth]) -> PixelMetrics:
+    """Compare network outputs (9, H, W) with their truths."""
+    parts = [_compare(o, t) for o, t in zip(outputs, truths, strict=True)]
+    error = np.concatenate([p[0] for p in parts])
+    lit, accepted_lit, unlit, accepted_unlit, asked, right, edges, found, both = (
+        sum(p[1][k] for p in parts) for k in range(9)
+    )
+    share = np.percentile(error, [50, 95]) if error.size else np.full(2, np.nan)
+    return PixelMetrics(
+        median=float(share[0]),
+        p95=float(share[1]),
+        gross=float((error.max(1) > GROSS).mean()) if error.size else float("nan"),
+        coverage=accepted_lit / max(lit, 1),
+        code_right=right / max(asked, 1),
+        false_share=accepted_unlit / max(unlit, 1),
+        edge_recall=both / max(edges, 1),
+        edge_precision=both / max(found, 1),
+    )
+
+
+def phase_error(output: NDArray[np.float32], truth: Truth) -> NDArray[np.float32]:
+    """Return the error (2, H, W) in periods, 0 to 1/2."""
+    phase = np.arctan2(output[0:4:2], output[1:4:2]) / (2 * np.pi)
+    away = phase - truth.lattice
+    return np.abs(away - np.round(away)).astype(np.float32)
+
+
+def _compare(
+    output: NDArray[np.float32], truth: Truth
+) -> tuple[NDArray[np.float32], tuple[int, ...]]:
+    accepted = output[7] > np.log(CONFIDENT / (1 - CONFIDENT))
+    asked = truth.code >= 0
+    right = asked & (output[4:7].argmax(0) == truth.code)
+    found = output[8] > np.log(EDGE_FOUND / (1 - EDGE_FOUND))
+    error = phase_error(output, truth)[:, accepted & truth.lit].T
+    counts = (
+        truth.lit, accepted & truth.lit, ~truth.lit, accepted & ~truth.lit, asked, right,
+        truth.edge, found, found & truth.edge,
+    )  # fmt: skip
+    return error, tuple(int(c.sum()) for c in counts)
