@@ -33,7 +33,7 @@ EFFECTS: Ranges = {
     "motion_angle": uniform(-3.14159, 3.14159),
     "speckle_contrast": uniform(0.0, 0.35),
     "speckle_grain": uniform(1.2, 3.0),
-    "exposure": log(0.6, 1.6),
+    "exposure": log(0.8, 4.0),
     "shot": log(1500.0, 20000.0),
     "read_noise": uniform(3.0, 25.0),
     "jpeg_quality": choose(None, None, 90, 70),

@@ -353,7 +353,9 @@ def load_config(path: str | Path | None) -> Config:
 
 def example_config() -> str:
     """Return the packaged example: the built-in configuration, explained line by line."""
-    return resources.files("mitsuba_endo.dataset").joinpath("example.yaml").read_text(encoding="utf-8")
+    return (
+        resources.files("mitsuba_endo.dataset").joinpath("example.yaml").read_text(encoding="utf-8")
+    )
 
 
 def save_config(path: str | Path, config: Config) -> None:

@@ -12,8 +12,8 @@ from . import contents
 from .reader import Dataset
 from .stored import Stored
 
-COLUMNS, ROWS = 4, 8
-THUMB = 192
+COLUMNS, ROWS = 3, 6
+THUMB = 256
 """Width of a picture, pixels."""
 GAP, LABEL = 8, 20
 SHEETS = 16

@@ -5,7 +5,7 @@ import multiprocessing.connection
 import os
 import signal
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,10 +22,10 @@ PATIENCE_S = 5.0
 class _Worker:
     process: Any
     connection: Any
+    left: int
+    """Samples until it is replaced."""
     index: int | None = None
     """The sample it works on."""
-    left: int = RECYCLE
-    """Samples until it is replaced."""
 
 
 def cores() -> int:
@@ -38,8 +38,25 @@ def cores() -> int:
 class LocalPool:
     """Processes that make samples; one that dies is replaced and its sample tried again."""
 
-    def __init__(self, job: Job, workers: int) -> None:
-        self._job, self._count = job, workers
+    def __init__(
+        self,
+        job: Job,
+        workers: int,
+        prepare: Callable[[], None] = prepare,
+        produce: Callable[[Job, int], Result] = produce,
+        recycle: int = RECYCLE,
+    ) -> None:
+        """Describe the workers; they start when there is work.
+
+        Args:
+            job: what is to be made.
+            workers: how many processes.
+            prepare: what each does first; importable by name, as is ``produce``.
+            produce: makes one sample.
+            recycle: samples after which a worker is replaced.
+        """
+        self._count, self._recycle = workers, recycle
+        self._arguments = job, prepare, produce
         self._context = multiprocessing.get_context("spawn")
         self._workers: list[_Worker] = []
 
@@ -108,10 +125,10 @@ class LocalPool:
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=(theirs, self._job), daemon=True)
+        process = self._context.Process(target=_serve, args=(theirs, *self._arguments), daemon=True)
         process.start()
         theirs.close()  # so that its end is noticed on ours
-        return _Worker(process, ours)
+        return _Worker(process, ours, self._recycle)
 
     def _dismiss(self, worker: _Worker) -> None:
         """Let an idle worker end by itself."""
@@ -130,7 +147,12 @@ class LocalPool:
         self._workers.clear()
 
 
-def _serve(connection: Any, job: Job) -> None:
+def _serve(
+    connection: Any,
+    job: Job,
+    prepare: Callable[[], None],
+    produce: Callable[[Job, int], Result],
+) -> None:
     """Make the samples whose numbers come in, until the other end closes."""
     # Ctrl-C reaches the whole group; the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
