@@ -78,20 +78,33 @@ def make_dataset(
     job = Job(config, str(out))
     began = _open_folder(out)
     with locked(out):
-        _begin(job, out, count, began)
-        store = job.store()
-        store.clear()
-        if retry_failed:
-            shutil.rmtree(out / FAILED, ignore_errors=True)
         try:
-            progress = _make_missing(job, store, count, pool, advance)
-        except BaseException:
-            # After an interruption, too, the manifest lists what is there, if it can be written.
-            with contextlib.suppress(InputError, OSError):
-                _close(store, out)
-            raise
-        _close(store, out)
-        shutil.rmtree(job.workshop(), ignore_errors=True)
+            _begin(job, out, count, began)
+            return _make_and_list(job, out, count, pool, advance, retry_failed)
+        finally:
+            shutil.rmtree(job.workshop(), ignore_errors=True)
+
+
+def _make_and_list(
+    job: Job,
+    out: Path,
+    count: int,
+    pool: Callable[[Job], Pool],
+    advance: Advance,
+    retry_failed: bool,
+) -> Progress:
+    """Make what is missing; the manifest lists what is there after an interruption, too."""
+    store = job.store()
+    store.clear()
+    if retry_failed:
+        shutil.rmtree(out / FAILED, ignore_errors=True)
+    try:
+        progress = _make_missing(job, store, count, pool, advance)
+    except BaseException:
+        with contextlib.suppress(InputError, OSError):  # the first fault is the one to tell
+            _close(store, out)
+        raise
+    _close(store, out)
     return progress
 
 

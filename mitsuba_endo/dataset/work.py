@@ -11,6 +11,7 @@ from .. import backend
 from ..errors import InputError
 from .config import Config
 from .folder_store import FolderStore
+from .sample import make_sample
 from .shard_store import ShardStore
 from .stored import Store
 from .workshop import Workshop
@@ -68,8 +69,6 @@ def prepare() -> None:
 
 def produce(job: Job, index: int) -> Result:
     """Make a sample and store it; whatever goes wrong with it becomes part of the result."""
-    from .sample import make_sample
-
     started = time.perf_counter()
     store = job.config.store
     try:

@@ -1,12 +1,14 @@
 """A dataset whose samples take a tenth of a second each."""
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from mitsuba_endo import backend
 from mitsuba_endo.dataset.config import Config
 from mitsuba_endo.dataset.run import Progress, make_dataset
-from mitsuba_endo.dataset.work import Job, Result, prepare, produce
+from mitsuba_endo.dataset.work import Job, Result, produce
 from mitsuba_endo.records.validation import validate
 
 SHEET = {
@@ -40,9 +42,24 @@ class InThisProcess:
         self._job, self._produce = job, produce
 
     def run(self, indices: Iterable[int]) -> Iterator[Result]:
-        prepare()
+        backend.ensure()
         for index in indices:
-            yield self._produce(self._job, index)
+            with one_thread():
+                result = self._produce(self._job, index)
+            yield result
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let Dr.Jit use one thread, as in a worker; other tests would read EXR files for ever."""
+    from mitsuba_endo.rendering.untyped import dr
+
+    before = dr.thread_count()
+    dr.set_thread_count(1)
+    try:
+        yield
+    finally:
+        dr.set_thread_count(before)
 
 
 def make_here(config: Config, out: Path, count: int, **options: Any) -> Progress:
