@@ -144,6 +144,7 @@ class DoeProjector:
 
     def parameters_changed(self, keys: Any = ()) -> None:
         self._refresh()
+        mi.Emitter.parameters_changed(self, list(keys))  # the scene learns of a sampling_weight
 
     def distortion(self) -> list[Any]:
         """Return k1, k2, p1, p2, k3."""

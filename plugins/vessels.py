@@ -95,7 +95,8 @@ class Vessels:
 
     @staticmethod
     def _luminance(rgb: tuple[Any, Any, Any]) -> Any:
-        return sum(w * c for w, c in zip(LUMINANCE, rgb, strict=True))
+        r, g, b = LUMINANCE
+        return r * rgb[0] + g * rgb[1] + b * rgb[2]
 
     def mean(self) -> Any:
         return self.base.mean()

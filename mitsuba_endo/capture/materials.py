@@ -4,24 +4,41 @@ from typing import Any
 
 import numpy as np
 
+from ..rendering import keys
+from ..rendering.untyped import mi
 from .diffusion import scattering_albedo
 from .settings import Tissue
 
 
-def wet_tissue(tissue: Tissue) -> dict[str, Any]:
-    """Return the opaque tissue: diffuse base, rough surface and wet film in one ``principled``."""
-    return _two_sided(tissue, _surface(tissue) | {"base_color": _colour(tissue)})
+def opaque_tissue(tissue: Tissue) -> dict[str, Any]:
+    """Return diffuse base, rough surface and wet film in one ``principled``."""
+    wet = {
+        "type": "principled", "base_color": _colour(tissue),
+        "roughness": tissue.roughness, "specular": tissue.specular,
+        "clearcoat": tissue.clearcoat, "clearcoat_gloss": tissue.clearcoat_gloss,
+    }  # fmt: skip
+    return {"type": "twosided", "bsdf": _with_relief(tissue, wet)}
 
 
-def dry_tissue(tissue: Tissue) -> dict[str, Any]:
-    """Return what light does that enters the tissue: the diffuse base alone."""
-    matt = {"type": "principled", "roughness": tissue.roughness, "specular": 0.0}
-    return _two_sided(tissue, matt | {"base_color": _colour(tissue)})
+def entering_part(tissue: Tissue) -> dict[str, Any]:
+    """Return the parameters of opaque tissue for light that enters it: the diffuse base alone."""
+    return _parameters(tissue, tissue.base_color, 0.0, 0.0)
 
 
-def wet_surface(tissue: Tissue) -> dict[str, Any]:
-    """Return what light does that does not enter: reflections of surface and film alone."""
-    return _two_sided(tissue, _surface(tissue) | {"base_color": {"type": "rgb", "value": 0.0}})
+def reflected_part(tissue: Tissue) -> dict[str, Any]:
+    """Return those for light that does not enter: reflections of surface and film alone."""
+    return _parameters(tissue, (0.0, 0.0, 0.0), tissue.specular, tissue.clearcoat)
+
+
+def _parameters(
+    tissue: Tissue, colour: tuple[float, float, float], specular: float, clearcoat: float
+) -> dict[str, Any]:
+    values = {
+        f"base_color.{'base.' if tissue.vessel_contrast else ''}value": mi.Color3f(*colour),
+        "specular": specular,
+        "clearcoat.value": clearcoat,
+    }
+    return {keys.tissue(name, tissue.relief > 0): value for name, value in values.items()}
 
 
 def translucent_tissue(tissue: Tissue) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -52,17 +69,6 @@ def index_of_refraction(specular: float) -> float:
     """
     root = float(np.sqrt(0.08 * max(specular, 0.05)))
     return (1 + root) / (1 - root)
-
-
-def _surface(tissue: Tissue) -> dict[str, Any]:
-    return {
-        "type": "principled", "roughness": tissue.roughness, "specular": tissue.specular,
-        "clearcoat": tissue.clearcoat, "clearcoat_gloss": tissue.clearcoat_gloss,
-    }  # fmt: skip
-
-
-def _two_sided(tissue: Tissue, bsdf: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "twosided", "bsdf": _with_relief(tissue, bsdf)}
 
 
 def _with_relief(tissue: Tissue, bsdf: dict[str, Any]) -> dict[str, Any]:

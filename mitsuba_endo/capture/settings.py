@@ -35,7 +35,7 @@ class Tissue(Record):
     subsurface: Literal["none", "blur", "medium"] = "blur"
     """Light inside the tissue: ``none``; ``blur``, a fast approximation on the image; ``medium``,
     a participating medium under a rough dielectric boundary, exact and slow."""
-    mean_free_path: Positive = 0.5
+    mean_free_path: Positive = 0.25
     """Reduced (transport) mean free path in the tissue, mm."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Chooses the vessels and the fine relief."""

@@ -37,7 +37,7 @@ class Placement:
     @classmethod
     def of_seed(cls, seed: int) -> "Placement":
         rng = np.random.default_rng(seed)
-        R = Rotation.random(random_state=rng).as_matrix()
+        R = Rotation.from_quat(rng.normal(size=4)).as_matrix()
         return cls(R, rng.uniform(-_SHIFT_MM, _SHIFT_MM, 3))
 
 

@@ -1,4 +1,4 @@
-"""The Mitsuba scenes of a photograph: mesh, tissue, camera, projector and lamp."""
+"""The Mitsuba scene of a photograph: mesh, tissue, camera, projector and lamp."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,8 +14,14 @@ from ..rendering.axes import to_world_from_pose
 from ..rendering.rays import pixel_rays
 from ..rendering.untyped import dr, mi
 from ..shapes.mesh import Mesh
-from .materials import dry_tissue, index_of_refraction, translucent_tissue, wet_surface, wet_tissue
-from .settings import CaptureSettings
+from .materials import (
+    entering_part,
+    index_of_refraction,
+    opaque_tissue,
+    reflected_part,
+    translucent_tissue,
+)
+from .settings import CaptureSettings, Light
 from .subsurface_blur import subsurface_blur
 
 LAMP_SAMPLES = 4
@@ -48,15 +54,71 @@ def trace(
     A pass for each light, because speckle belongs to the laser, and because the path tracer
     chooses one light at random at every reflection, which would turn two into noise.
     """
-    light = settings.light
-    laser = {keys.PROJECTOR: _projector(setup, light.projector_power)}
-    by_laser = _render(setup, settings, laser, settings.spp, 2 * seed)
-    if not light.lamp:
-        return by_laser, np.zeros_like(by_laser)
-    intensity = light.lamp * light.projector_power * mean_intensity(setup)
-    lamps = _lamps(setup, light.lamp_offset, intensity * np.array(light.lamp_color))
+    studio = Studio(setup, settings)
+    laser = studio.by(keys.PROJECTOR, settings.spp, 2 * seed)
+    if not settings.light.lamp:
+        return laser, np.zeros_like(laser)
     spp = max(1, settings.spp // LAMP_SAMPLES)
-    return by_laser, _render(setup, settings, lamps, spp, 2 * seed + 1)
+    return laser, studio.by(keys.LAMP, spp, 2 * seed + 1)
+
+
+class Studio:
+    """One loaded scene, rendered light by light."""
+
+    def __init__(self, setup: SetUp, settings: CaptureSettings) -> None:
+        self._tissue, self._setup = settings.tissue, setup
+        medium = None
+        bsdf = opaque_tissue(self._tissue)
+        walk = {"type": "path", "max_depth": settings.max_depth}
+        if self._tissue.subsurface == "medium":
+            bsdf, medium = translucent_tissue(self._tissue)
+            walk = {"type": "volpath", "max_depth": _LONGEST_WALK}
+        self._integrator: Any = mi.load_dict(walk)
+        self._scene: Any = mi.load_dict({
+            "type": "scene", keys.CAMERA: _sensor(setup),
+            keys.SURFACE: _surface(setup.mesh, bsdf, medium), **_lights(setup, settings.light),
+        })  # fmt: skip
+        self._parameters = mi.traverse(self._scene)
+
+    def by(self, light: str, spp: int, seed: int) -> NDArray[np.float32]:
+        """Return the radiance (h, w, 3) by the light whose ids begin with ``light``."""
+        for emitter in self._scene.emitters():
+            chosen = float(emitter.id().startswith(light))
+            self._parameters[keys.sampling_weight(emitter.id())] = chosen
+        if self._tissue.subsurface != "blur":
+            self._parameters.update()
+            return self._image(self._integrator, spp, seed)
+        self._set(entering_part(self._tissue))
+        entered = self._spread(self._image(self._integrator, spp, seed))
+        self._set(reflected_part(self._tissue))
+        direct: Any = mi.load_dict({"type": "path", "max_depth": 2})
+        return entered + self._image(direct, spp, seed)
+
+    def _set(self, values: dict[str, Any]) -> None:
+        for key, value in values.items():  # update(values) would pass over unknown keys
+            self._parameters[key] = value
+        self._parameters.update()
+
+    def _image(self, integrator: Any, spp: int, seed: int) -> NDArray[np.float32]:
+        image = mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
+        return np.array(image, np.float32)[..., :3]
+
+    def _spread(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        points, pixels_per_mm = self._seen()
+        tissue = self._tissue
+        return subsurface_blur(
+            image, points, pixels_per_mm, tissue.mean_free_path, tissue.base_color,
+            index_of_refraction(tissue.specular),
+        )  # fmt: skip
+
+    def _seen(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the points (h, w, 3) that pixels see, mm, NaN = none, and pixels per mm (h, w)."""
+        ray, width, height = pixel_rays(self._scene.sensors()[0])
+        found = self._scene.ray_intersect_preliminary(ray, coherent=True)
+        distance = dr.select(found.is_valid(), found.t, dr.nan)
+        points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
+        along = np.array(distance, np.float32).reshape(height, width)
+        return points, np.float32(self._setup.camera.K[0, 0]) / along
 
 
 def mean_intensity(setup: SetUp) -> float:
@@ -65,52 +127,12 @@ def mean_intensity(setup: SetUp) -> float:
     return float(on_axis[0]) / (setup.pattern_size[0] * setup.pattern_size[1])
 
 
-def _render(
-    setup: SetUp, settings: CaptureSettings, lights: dict[str, Any], spp: int, seed: int
-) -> NDArray[np.float32]:
-    tissue = settings.tissue
-    path = {"type": "path", "max_depth": settings.max_depth}
-    if tissue.subsurface == "medium":
-        boundary, medium = translucent_tissue(tissue)
-        walk = {"type": "volpath", "max_depth": _LONGEST_WALK}
-        return _image(_scene(setup, boundary, walk, lights, medium), spp, seed)
-    if tissue.subsurface == "none":
-        return _image(_scene(setup, wet_tissue(tissue), path, lights), spp, seed)
-    inside = _scene(setup, dry_tissue(tissue), path, lights)
-    points, pixels_per_mm = _seen(inside, setup)
-    entered = subsurface_blur(
-        _image(inside, spp, seed), points, pixels_per_mm, tissue.mean_free_path, tissue.base_color,
-        index_of_refraction(tissue.specular),
-    )  # fmt: skip
-    direct = {"type": "path", "max_depth": 2}
-    return entered + _image(_scene(setup, wet_surface(tissue), direct, lights), spp, seed)
-
-
-def _image(scene: Any, spp: int, seed: int) -> NDArray[np.float32]:
-    return np.array(mi.render(scene, spp=spp, seed=seed), np.float32)[..., :3]
-
-
-def _seen(scene: Any, setup: SetUp) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the points (h, w, 3) that pixels see, mm, NaN = none, and pixels per mm (h, w)."""
-    ray, width, height = pixel_rays(scene.sensors()[0])
-    si = scene.ray_intersect_preliminary(ray, coherent=True)
-    distance = dr.select(si.is_valid(), si.t, dr.nan)
-    points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
-    along = np.array(distance, np.float32).reshape(height, width)
-    return points, np.float32(setup.camera.K[0, 0]) / along
-
-
-def _scene(
-    setup: SetUp,
-    bsdf: dict[str, Any],
-    integrator: dict[str, Any],
-    lights: dict[str, Any],
-    medium: dict[str, Any] | None = None,
-) -> Any:
-    return mi.load_dict({
-        "type": "scene", "integrator": integrator, keys.CAMERA: _sensor(setup),
-        keys.SURFACE: _surface(setup.mesh, bsdf, medium), **lights,
-    })  # fmt: skip
+def _lights(setup: SetUp, light: Light) -> dict[str, Any]:
+    lights = {keys.PROJECTOR: _projector(setup, light.projector_power)}
+    if light.lamp:
+        intensity = light.lamp * light.projector_power * mean_intensity(setup)
+        lights |= _lamps(setup, light.lamp_offset, intensity * np.array(light.lamp_color))
+    return lights
 
 
 def _pose(world_from_object: RigidTransform) -> Any:

@@ -42,6 +42,19 @@ def vertex_texcoords(shape: str = SURFACE) -> str:
     return f"{shape}.vertex_texcoords"
 
 
+def tissue(name: str, relief: bool) -> str:
+    """Return the key of a parameter of the ``principled`` tissue of simulated photographs.
+
+    It lies in a ``twosided`` material of the surface, and in a ``bumpmap`` if there is relief.
+    """
+    return f"{SURFACE}.bsdf.brdf_0.{'nested_bsdf.' if relief else ''}{name}"
+
+
+def sampling_weight(emitter: str) -> str:
+    """Return the key of how often an emitter is chosen relative to others; 0 = off."""
+    return f"{emitter}.sampling_weight"
+
+
 def to_world(identifier: str) -> str:
     """Return the key of a sensor's or emitter's pose, in Mitsuba's axes (see :mod:`.axes`)."""
     return f"{identifier}.to_world"
