@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
+from .live import watching
 
 if TYPE_CHECKING:
     from ..records.checkpoint import Checkpoint
     from ..records.correspondence import CorrespondenceMap
+    from ..records.history import Observe
     from ..records.rig import Rig
     from ..records.solution import Solution
     from ..solve.options import Options
@@ -52,6 +54,11 @@ Pattern = Annotated[
 ]
 
 
+Live = Annotated[
+    bool, typer.Option("--live", help="Watch the optimisation in a browser; Ctrl-C ends.")
+]
+
+
 def calibrate(
     maps: Maps,
     rig: RigFile,
@@ -62,6 +69,7 @@ def calibrate(
     seed: Seed = 0,
     resume: Resume = None,
     pattern: Pattern = None,
+    live: Live = False,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -82,9 +90,13 @@ def calibrate(
         paths = decode_images(maps, rig, pattern, Path(aside), output)
         frames, rig_record = load_input(paths, rig, share)
         options = Options(solver=solver, start=start, seed=seed)
-        solution = solve_and_write(frames, rig_record, options, out, output, checkpoint)
-        keep_decoded(Path(aside), out)
-        report(solution, out, output)
+        with watching(live, rig_record, output) as watch:
+            show = watch and watch.view.show
+            solution = solve_and_write(frames, rig_record, options, out, output, checkpoint, show)
+            keep_decoded(Path(aside), out)
+            report(solution, out, output)
+            if watch:
+                watch.end(solution, output)
         raise typer.Exit(exit_code(solution))
 
 
@@ -148,6 +160,7 @@ def solve_and_write(
     out: Path,
     output: Session,
     resume: "Checkpoint | None" = None,
+    observe: "Observe | None" = None,
 ) -> "Solution":
     """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
@@ -157,7 +170,7 @@ def solve_and_write(
         from ..show.solution_folder import write_solution_folder
         from ..solve.calibrate import calibrate as solve
 
-        result = solve(maps, rig, options, advance, resume)
+        result = solve(maps, rig, options, advance, resume, observe)
         advance(0.95, "Drawing pictures")
         return write_solution_folder(out, result, rig)
 

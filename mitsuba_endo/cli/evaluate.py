@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Debug, Json, Quiet, Session, session
+from .options import Result
 
 if TYPE_CHECKING:
     from ..evaluate.metrics import Metrics
 
-Result = Annotated[
-    Path, typer.Argument(metavar="RESULT", help="Solution folder, or its solution.json.")
-]
 Truth = Annotated[Path, typer.Option("--truth", help="Truth file of the synthetic scene.")]
 Out = Annotated[Path, typer.Option("--out", help="File to write, e.g. metrics.json.")]
 

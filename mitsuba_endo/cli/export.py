@@ -6,10 +6,8 @@ from typing import Annotated
 import typer
 
 from .console import Debug, Json, Quiet, session
+from .options import Result
 
-Result = Annotated[
-    Path, typer.Argument(metavar="RESULT", help="Solution folder, or its solution.json.")
-]
 Format = Annotated[
     str, typer.Option("--format", metavar="NAME", help="opencv, colmap, ply or mitsuba.")
 ]

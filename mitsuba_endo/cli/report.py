@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from .console import Debug, Json, Quiet, session
+from .options import MaybeTruth
 
 Results = Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Solution folders.")]
 Out = Annotated[Path, typer.Option("--out", help="HTML file to write.")]
@@ -14,6 +15,7 @@ Out = Annotated[Path, typer.Option("--out", help="HTML file to write.")]
 def report(
     results: Results,
     out: Out = Path("report.html"),
+    truth: MaybeTruth = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -22,9 +24,15 @@ def report(
     with session(quiet, as_json, debug) as output:
         from ..show.read_folder import read_solution_folder
         from ..show.report import save_report
+        from ..show.truth import find_truth
 
         calibrations = [read_solution_folder(path) for path in results]
-        save_report(out, list(zip(_names(results), calibrations, strict=True)))
+        truths = [
+            truth or find_truth(path, calibration.solution)
+            for path, calibration in zip(results, calibrations, strict=True)
+        ]
+        named = list(zip(_names(results), calibrations, strict=True))
+        save_report(out, named, truths=truths)
         output.print(f"{out}: open it in a browser.")
         output.summary({"report": str(out), "results": [str(r) for r in results]})
 

@@ -45,18 +45,24 @@ def banded(low: float, high: float) -> tuple[Colormap, Normalize, float]:
 
 
 def shaded(
-    values: NDArray[np.float64], normals: NDArray[np.float64], scale: str, norm: Normalize
+    values: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    scale: str,
+    norm: Normalize,
+    relief: float = 0.6,
 ) -> NDArray[np.float64]:
-    """Return an RGBA image of ``values`` (H, W) lit from the upper left; missing is light grey.
+    """Return an RGBA image of ``values`` (...) lit from the upper left; missing is light grey.
 
     Args:
         values: what the colour shows.
-        normals: (H, W, 3) unit normals towards the camera, OpenCV axes.
+        normals: (..., 3) unit normals towards the camera, OpenCV axes.
         scale: name of the colour map.
         norm: range of the values.
+        relief: how much darker the shadows are than what faces the light.
     """
     light = np.array([-0.5, -0.6, -0.62])
-    bright = 0.45 + 0.6 * np.clip(np.nan_to_num(normals) @ (light / np.linalg.norm(light)), 0, 1)
+    facing = np.clip(np.nan_to_num(normals) @ (light / np.linalg.norm(light)), 0, 1)
+    bright = 1.05 - relief + relief * facing
     image = matplotlib.colormaps[scale](norm(np.nan_to_num(values, nan=norm.vmin or 0.0)))
     image[..., :3] = np.clip(image[..., :3] * bright[..., None], 0, 1)
     image[~np.isfinite(values)] = to_rgba(MISSING)

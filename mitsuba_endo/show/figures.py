@@ -7,12 +7,14 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
 
 from ..files import atomic_path
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, FrameMaps, TraceRow
 from ..records.solution import Solution
 from . import panels
+from .places import places
 from .view import SurfaceView
 
 DPI = 110
@@ -88,15 +90,26 @@ def convergence_figure(trace: list[TraceRow]) -> Figure:
     return figure
 
 
-def surface_figure(view: SurfaceView, unit: str) -> Figure:
-    """Draw the depth of the surface in the first camera and, if known, its uncertainty."""
+def surface_figure(
+    view: SurfaceView, unit: str, error: NDArray[np.float64] | None = None
+) -> Figure:
+    """Draw the depth of the surface in the first camera and, if known, uncertainty and error.
+
+    Args:
+        view: the surface.
+        unit: of length.
+        error: (H, W) found minus true range along the camera's rays.
+    """
     height, width = view.depth.shape
-    count = 1 if view.std is None else 2
-    figure = Figure(figsize=_size(width, height, count, 1), layout="constrained")
+    count = 1 + (view.std is not None) + (error is not None)
+    size = np.array(_size(width, height, count, 1)) * min(1.0, 2.2 / count)  # keeps text readable
+    figure = Figure(figsize=(size[0], size[1]), layout="constrained")
     axes = np.atleast_1d(figure.subplots(1, count))
     panels.depth(axes[0], view, unit, "Surface in the first camera")
     if view.std is not None:
         panels.surface_std(axes[1], view, unit)
+    if error is not None:
+        panels.surface_error(axes[-1], error, unit)
     return figure
 
 
@@ -187,16 +200,8 @@ def _quantity(value: Any, std: Any, status: str, unit: str) -> str:
 
 def projector_poses(solution: Solution) -> list[RigidTransform]:
     """Return every known projector's pose in the first camera's frame."""
-    first = solution.frames[0].world_from_camera.to_transform()
-    found = []
-    for frame in solution.frames:
-        pose = frame.projector_from_camera.to_transform()
-        camera = frame.world_from_camera.to_transform()
-        if frame is solution.frames[0]:
-            camera = first = first or RigidTransform.identity()
-        if pose is not None and camera is not None and first is not None:
-            found.append(first.inverse() @ camera @ pose.inverse())
-    return found
+    found = [place.first_from_projector for place in places(solution)]
+    return [pose for pose in found if pose is not None]
 
 
 def _of(frame: FrameMaps, frames: list[FrameMaps], prefix: str = "") -> str:

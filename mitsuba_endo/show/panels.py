@@ -129,6 +129,17 @@ def surface_std(axes: Axes, view: SurfaceView, unit: str) -> None:
     image_axes(axes, "Uncertainty of the surface")
 
 
+def surface_error(axes: Axes, error: NDArray[np.float64], unit: str) -> None:
+    """Draw found minus true range (H, W) along the viewing rays, signed."""
+    known = np.abs(error[np.isfinite(error)])
+    top = float(np.percentile(known, 98)) if len(known) else 1.0
+    norm = Normalize(-top, top)
+    scale = matplotlib.colormaps[RESIDUAL].with_extremes(bad=MISSING)
+    axes.imshow(error, cmap=scale, norm=norm, interpolation="nearest")
+    _value_bar(axes, norm, RESIDUAL, f"found - true range, {unit}")
+    image_axes(axes, "Error to the truth")
+
+
 def _value_bar(axes: Axes, norm: Normalize, scale: str, label: str, extend: str = "both") -> None:
     mappable = ScalarMappable(norm, scale)
     bar = axes.figure.colorbar(mappable, ax=axes, extend=extend, shrink=0.85, pad=0.02, aspect=25)

@@ -25,25 +25,48 @@ function decoded(text) {
 }
 
 // Points sorted by depth and painted back to front: needs no WebGL, so it works everywhere.
-function connectScene(canvas) {
-  const data = JSON.parse(canvas.dataset.scene);
-  const points = new Float32Array(decoded(data.points));
-  const colours = new Uint8Array(decoded(data.colours));
-  const count = points.length / 3;
-  const order = Uint32Array.from({ length: count }, (_, i) => i);
-  const [sx, sy, depth] = [0, 1, 2].map(() => new Float32Array(count));
+function connectScene(space) {
+  const data = JSON.parse(space.dataset.scene);
+  const names = JSON.parse(space.dataset.frames);
+  const canvas = space.querySelector("canvas");
+  const slider = space.querySelector("[name=shown]");
+  const told = space.querySelector("output");
+  const radios = [...space.querySelectorAll("[type=radio]")];
+  const boxes = [...space.querySelectorAll("[type=checkbox]")];
+  const legends = [...space.querySelectorAll(".legend")];
+  const surfaces = data.surfaces.map((s) => new Float32Array(decoded(s.points)));
+  const colours = data.colours.map((q) => q.map((c) => new Uint8Array(decoded(c))));
   const context = canvas.getContext("2d");
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const include = (p) => p.forEach((v, i) => {
     low[i] = Math.min(low[i], v);
     high[i] = Math.max(high[i], v);
   });
-  for (let i = 0; i < count; i++) include([points[3 * i], points[3 * i + 1], points[3 * i + 2]]);
-  data.lines.forEach((line) => line.segments.forEach((s) => s.forEach(include)));
+  for (const s of surfaces) {
+    for (let i = 0; i < s.length; i += 3) include([s[i], s[i + 1], s[i + 2]]);
+  }
+  for (const line of data.lines) {
+    if (line.kind === "frusta") line.segments.forEach((s) => s.forEach(include));
+  }
   const centre = low.map((v, i) => (v + high[i]) / 2);
   const radius = Math.hypot(...low.map((v, i) => (high[i] - v) / 2));
+  let points, colour, size, lines, order, sx, sy, depth;
   let yaw, pitch, zoom, pending = false;
 
+  function choose() {
+    const frame = slider ? slider.value - 1 : -1;  // -1: all
+    if (told) told.textContent = frame < 0 ? "all" : names[frame];
+    const quantity = Math.max(0, radios.findIndex((r) => r.checked));
+    legends.forEach((l, i) => { l.hidden = i !== quantity; });
+    const shown = surfaces.length > 1 && frame >= 0 ? frame : 0;
+    [points, colour, size] = [surfaces[shown], colours[quantity][shown], data.surfaces[shown].size];
+    const kinds = boxes.filter((b) => b.checked).map((b) => b.name);
+    lines = data.lines.filter((l) => kinds.includes(l.kind) && (frame < 0 || l.frame === frame));
+    const count = points.length / 3;
+    order = Uint32Array.from({ length: count }, (_, i) => i);
+    [sx, sy, depth] = [0, 1, 2].map(() => new Float32Array(count));
+    redraw();
+  }
   function project(x, y, z, scale, width, height) {
     const [cy, sy_, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
     const [dx, dy, dz] = [x - centre[0], y - centre[1], z - centre[2]];
@@ -58,26 +81,26 @@ function connectScene(canvas) {
     const width = canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     const height = canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     const scale = zoom * 0.5 * Math.min(width, height) / radius;
-    for (let i = 0; i < count; i++) {
+    for (let i = 0; i < order.length; i++) {
       const at = project(points[3 * i], points[3 * i + 1], points[3 * i + 2], scale, width, height);
       sx[i] = at[0]; sy[i] = at[1]; depth[i] = at[2];
     }
     order.sort((a, b) => depth[b] - depth[a]);
-    const side = Math.max(1.5 * ratio, 1.5 * scale * data.size);
+    const side = Math.max(1.5 * ratio, 1.5 * scale * size);
     for (const i of order) {
-      context.fillStyle = `rgb(${colours[3 * i]},${colours[3 * i + 1]},${colours[3 * i + 2]})`;
+      context.fillStyle = `rgb(${colour[3 * i]},${colour[3 * i + 1]},${colour[3 * i + 2]})`;
       context.fillRect(sx[i] - side / 2, sy[i] - side / 2, side, side);
     }
-    context.lineWidth = 1.5 * ratio;
-    for (const line of data.lines) {
+    for (const line of lines) {
       context.strokeStyle = line.colour;
+      context.lineWidth = (line.kind === "rays" ? 0.6 : 1.5) * ratio;
+      context.beginPath();
       for (const [a, b] of line.segments) {
         const [p, q] = [a, b].map((c) => project(...c, scale, width, height));
-        context.beginPath();
         context.moveTo(p[0], p[1]);
         context.lineTo(q[0], q[1]);
-        context.stroke();
       }
+      context.stroke();
     }
   }
   function redraw() {
@@ -85,7 +108,7 @@ function connectScene(canvas) {
     pending = true;
   }
   function reset() {
-    [yaw, pitch, zoom] = [0.45, -0.35, 1.45];
+    [yaw, pitch, zoom] = [0.95, -0.3, 1.5];
     redraw();
   }
   canvas.addEventListener("pointerdown", (e) => canvas.setPointerCapture(e.pointerId));
@@ -101,12 +124,14 @@ function connectScene(canvas) {
     redraw();
   }, { passive: false });
   canvas.addEventListener("dblclick", reset);
+  space.addEventListener("input", choose);
   window.addEventListener("resize", redraw);
   reset();
+  choose();
 }
 
 document.querySelectorAll(".viewer").forEach(connectViewer);
-document.querySelectorAll("canvas.scene").forEach(connectScene);
+document.querySelectorAll(".space").forEach(connectScene);
 window.addEventListener("beforeprint", () => {
   document.querySelectorAll("details").forEach((d) => { d.open = true; });
 });

@@ -8,40 +8,49 @@ from pathlib import Path
 from ..files import atomic_path
 from ..records.calibration import Calibration
 from . import report_sections as sections
+from .content import Content
+from .truth import load_truth
 from .view import SurfaceView, view_surface
 
 REPORT = "report.html"
 
 
 def save_report(
-    path: str | Path, results: Sequence[tuple[str, Calibration]], views: Sequence[SurfaceView] = ()
+    path: str | Path,
+    results: Sequence[tuple[str, Calibration]],
+    views: Sequence[SurfaceView] = (),
+    truths: Sequence[Path | None] = (),
 ) -> None:
     """Write one self-contained page: no network, no other file.
 
     Args:
         path: the HTML file.
         results: name and calibration of each result; several stand side by side.
-        views: of the surfaces, where they are at hand already.
+        views: of the first surface of each result, where they are at hand already.
+        truths: of each result, where it is synthetic.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the file cannot be written, or a truth is not that of its result.
     """
     views = views or [view_surface(c.surface, c.camera) for _, c in results]
-    page = _page(results, views)
+    contents = [Content(calibration) for _, calibration in results]
+    for content, truth in zip(contents, truths, strict=False):
+        if truth is not None:
+            content.truth = load_truth(truth, content.calibration)
+    page = _page([name for name, _ in results], contents, views)
     with atomic_path(path) as aside:
         aside.write_text(page, encoding="utf-8")
 
 
-def _page(results: Sequence[tuple[str, Calibration]], views: Sequence[SurfaceView]) -> str:
-    names = [name for name, _ in results]
-    several = len(results) > 1
+def _page(names: list[str], contents: list[Content], views: Sequence[SurfaceView]) -> str:
+    several = len(contents) > 1
     compared = ""
     if several:
-        table = sections.comparison(names, [c.solution for _, c in results])
+        table = sections.comparison(names, [c.calibration.solution for c in contents])
         compared = f"<h3>Compared, with 95 % intervals</h3>{table}<p></p>"
     articles = "".join(
-        _article(i, name, calibration, view)
-        for i, ((name, calibration), view) in enumerate(zip(results, views, strict=True))
+        _article(i, name, content, view)
+        for i, (name, content, view) in enumerate(zip(names, contents, views, strict=True))
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -57,12 +66,12 @@ def _page(results: Sequence[tuple[str, Calibration]], views: Sequence[SurfaceVie
     )
 
 
-def _article(number: int, name: str, calibration: Calibration, view: SurfaceView) -> str:
-    solution = calibration.solution
+def _article(number: int, name: str, content: Content, view: SurfaceView) -> str:
+    calibration, solution = content.calibration, content.calibration.solution
     return (
         f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
         f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
-        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(calibration, view)}"
+        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(content, view, number)}"
         f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"
     )
 

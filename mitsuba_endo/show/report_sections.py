@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from ..records.calibration import Calibration
 from ..records.solution import Outcome, Solution
 from . import figures
+from .content import Content
 from .numbers import Row, rows
-from .view import SurfaceView
+from .view import SurfaceView, view_surface
 from .web_images import MapImages, MapPages, Scale, figure_image, figure_svg, map_pages
-from .web_scene import scene_canvas
+from .web_scene import scene_canvas, view_error
 
 _CHART_INCHES = 5.2
 """Width at which the smallest label is readable in half a page."""
@@ -150,11 +151,15 @@ def _bar(scale: Scale) -> str:
     )
 
 
-def charts(calibration: Calibration, view: SurfaceView) -> str:
+def charts(content: Content, view: SurfaceView, number: int) -> str:
     """Return surface, residual distribution, rig and convergence."""
+    calibration = content.calibration
     solution, trace = calibration.solution, calibration.trace
     scale = trace[-1].scale_px if trace else None
-    surface = figure_image(figures.surface_figure(view, figures.unit_name(solution)))
+    known_truth = content.truth is not None and content.truth.surface is not None
+    error = view_error(content, 0, view) if known_truth else None
+    surface = figure_image(figures.surface_figure(view, content.unit, error))
+    views = [view, *(view_surface(s, calibration.camera) for s in content.surfaces[1:])]
     drawn = [
         ("residual distribution", figures.histogram_figure(
             calibration.frames, solution.noise_px, scale
@@ -171,7 +176,7 @@ def charts(calibration: Calibration, view: SurfaceView) -> str:
     images = "".join(_chart(alt, figure) for alt, figure in drawn)
     return (
         f'<h3>Surface</h3><img class="wide" alt="surface and its uncertainty" src="{surface}">'
-        f"<h3>Surface and rig in space</h3><figure>{scene_canvas(calibration, view)}</figure>"
+        f"<h3>Surface and rig in space</h3><figure>{scene_canvas(content, views, number)}</figure>"
         f'<h3>Residuals, rig and convergence</h3><div class="charts">{images}</div>'
     )
 

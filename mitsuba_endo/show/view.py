@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from ..evaluate.depth import RayCaster
+from ..evaluate.depth import RayCaster, range_image
 from ..geometry.cameras import CameraModel
 from ..records.calibration import SurfaceEstimate
 
@@ -51,6 +51,11 @@ def view_surface(surface: SurfaceEstimate, camera: CameraModel) -> SurfaceView:
         std[seen] = np.sum(weights * surface.std[corners], -1)
         std = std.reshape(rays.shape[:2])
     return SurfaceView(points.reshape(rays.shape), normals.reshape(rays.shape), std)
+
+
+def range_of(surface: SurfaceEstimate, camera: CameraModel) -> Floats:
+    """Return the range (H, W) of a surface in the camera's frame along the camera's rays."""
+    return range_image(RayCaster(surface.vertices, surface.faces), camera)
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Surface, camera and projectors as data for the page's interactive view."""
+"""Surfaces, cameras, projectors and rays as data for the page's interactive view."""
 
 import base64
 import json
@@ -10,97 +10,176 @@ import numpy as np
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from ..geometry.transforms import RigidTransform
-from ..records.calibration import Calibration
-from ..records.solution import Solution
-from .colours import CAMERA, DEPTH, PROJECTOR, shaded
-from .figures import projector_poses, unit_name
-from .view import SurfaceView
+from . import surface_colours
+from .colours import CAMERA, PROJECTOR, shaded
+from .content import Content, seen_from
+from .places import Floats, Place, camera_corners, pyramid, solution_corners
+from .surface_colours import Shown
+from .view import SurfaceView, range_of
 
 _POINTS = 12_000
-_STD = "magma"
-_AXIS = np.array([[0.0, 0.0, 1.0]])
-_REACH = 0.4
-"""Length of the drawn frusta over the surface's distance."""
+"""Of one surface; of several together twice as many."""
+_TRUTH = "#3a3a3a"
 
 
-def scene_canvas(calibration: Calibration, view: SurfaceView) -> str:
-    """Return a canvas that report.js turns into a view to be turned with the mouse.
+def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) -> str:
+    """Return a canvas, with its controls, that report.js turns into a view to be turned.
 
-    Points are what the first camera sees of the surface, in its frame, coloured by standard
-    deviation where known, else by depth.
+    Points are what the cameras see of their surfaces, in the first camera's frame.
+
+    Args:
+        content: the result.
+        views: of every surface in its camera.
+        number: of the result on its page.
     """
+    if not any(np.isfinite(view.depth).any() for view in views):
+        return "<p>The cameras see nothing of the surfaces.</p>"
+    room = _POINTS if len(views) == 1 else 2 * _POINTS // len(views)
+    kept = [_thinned(view, room) for view in views]
+    quantities = _quantities(content, views, kept)
+    data = {
+        "surfaces": [
+            _surface(content, *args) for args in zip(range(len(views)), views, kept, strict=True)
+        ],
+        "colours": [
+            [
+                _base64(_painted(q, s, v, k))
+                for s, (v, k) in enumerate(zip(views, kept, strict=True))
+            ]
+            for q in quantities
+        ],
+        "lines": _lines(content),
+    }
+    frames = [place.name for place in content.places]
+    return (
+        f'<div class="space" data-scene="{escape(json.dumps(data))}" '
+        f'data-frames="{escape(json.dumps(frames))}">'
+        f"{_controls(content, quantities, number)}"
+        '<canvas class="scene"></canvas>'
+        + "".join(f'<div class="legend"{" hidden" * (i > 0)}>{q.legend()}</div>'
+                  for i, q in enumerate(quantities))
+        + f"<figcaption>{_caption(content)}</figcaption></div>"
+    )  # fmt: skip
+
+
+def _thinned(view: SurfaceView, room: int) -> NDArray[np.bool_]:
+    """Return the pixels (H, W) of a view whose points are drawn."""
     seen = np.isfinite(view.depth)
-    if not seen.any():
-        return "<p>The camera sees nothing of the surface.</p>"
-    step = max(1, math.ceil(math.sqrt(seen.sum() / _POINTS)))
+    step = max(1, math.ceil(math.sqrt(seen.sum() / room)))
     kept = np.zeros_like(seen)
     kept[::step, ::step] = True
-    kept &= seen
-    points = view.points[kept]
-    distance = float(np.median(np.linalg.norm(points, axis=-1)))
-    data = {
-        "points": _base64(points.astype("<f4")),
-        "colours": _base64(np.round(255 * _colours(view)[kept][:, :3]).astype(np.uint8)),
-        "size": step * distance / float(calibration.camera.K[0, 0]),
-        "lines": _frusta(calibration, _REACH * distance),
-    }
-    coloured = "standard deviation, bright is uncertain" if view.std is not None else "depth"
-    return (
-        f'<canvas class="scene" data-scene="{escape(json.dumps(data))}"></canvas>'
-        f"<figcaption>Colour: {coloured}. Blue: camera; orange: projector; lengths in "
-        f"{unit_name(calibration.solution)}. Drag to turn, wheel to zoom, double click to reset."
-        "</figcaption>"
+    return kept & seen
+
+
+def _surface(
+    content: Content, index: int, view: SurfaceView, kept: NDArray[np.bool_]
+) -> dict[str, Any]:
+    points = content.first_from_surface(index).apply(view.points[kept])
+    spacing = math.sqrt(np.isfinite(view.depth).sum() / max(kept.sum(), 1))
+    size = spacing * content.distance / float(content.calibration.camera.K[0, 0])
+    return {"points": _base64(points.astype("<f4")), "size": size}
+
+
+def _quantities(
+    content: Content, views: list[SurfaceView], kept: list[NDArray[np.bool_]]
+) -> list[Shown]:
+    """Return what the points can be coloured by: of uncertainty, error, and else depth."""
+    pairs = list(zip(views, kept, strict=True))
+    out = []
+    if all(view.std is not None for view in views):
+        stds = [view.std[k] for view, k in pairs if view.std is not None]
+        out.append(surface_colours.uncertainty(stds, content.unit))
+    truth = content.truth
+    if truth is not None and truth.surface is not None:
+        errors = [view_error(content, s, view)[k] for s, (view, k) in enumerate(pairs)]
+        out.append(surface_colours.error(errors, content.unit, truth.alignment))
+    return out or [surface_colours.depth([view.points[k] for view, k in pairs], content.unit)]
+
+
+def view_error(content: Content, surface: int, view: SurfaceView) -> Floats:
+    """Return found minus true range (H, W) along a camera's rays, NaN = unknown."""
+    truth = content.truth
+    assert truth is not None
+    true = range_of(seen_from(truth, surface), content.calibration.camera)
+    return np.linalg.norm(view.points, axis=-1) - true
+
+
+def _painted(
+    shown: Shown, surface: int, view: SurfaceView, kept: NDArray[np.bool_]
+) -> NDArray[np.uint8]:
+    values, norm = shown.values[surface], Normalize(shown.low, shown.high)
+    rgba = shaded(values, view.normals[kept], shown.scale, norm, relief=0.35)
+    return np.round(255 * rgba[:, :3]).astype(np.uint8)
+
+
+def _lines(content: Content) -> list[dict[str, Any]]:
+    """Return frusta and rays: colour, kind, frame and segments."""
+    out = []
+    truth = content.truth
+    for k, place in enumerate(content.places):
+        out += _frusta(content, k, place, "frusta", (CAMERA, PROJECTOR))
+        rays = content.rays(k)
+        if rays is not None:
+            out.append(_line(CAMERA, "rays", k, rays.camera))
+            out.append(_line(PROJECTOR, "rays", k, rays.projector))
+        if truth is not None:
+            out += _frusta(content, k, truth.places[k], "truth", (_TRUTH, _TRUTH))
+    return out
+
+
+def _frusta(
+    content: Content, frame: int, place: Place, kind: str, colours: tuple[str, str]
+) -> list[dict[str, Any]]:
+    solution = content.calibration.solution
+    corners = (
+        camera_corners(content.calibration.camera),
+        solution_corners(solution, solution.frames[frame]),
     )
-
-
-def _colours(view: SurfaceView) -> NDArray[np.float64]:
-    if view.std is None:
-        low, high = np.nanpercentile(view.depth, [1, 99])
-        return shaded(view.depth, view.normals, DEPTH, Normalize(low, max(high, low + 1e-9)))
-    top = float(np.nanpercentile(view.std, 98))
-    return shaded(view.std, view.normals, _STD, Normalize(0, max(top, 1e-12)))
-
-
-def _frusta(calibration: Calibration, reach: float) -> list[dict[str, Any]]:
-    camera, solution = calibration.camera, calibration.solution
-    w, h = camera.width - 1, camera.height - 1
-    corners = camera.rays(np.array([[0, 0], [w, 0], [w, h], [0, h]], float))
-    lines = [_pyramid(RigidTransform.identity(), corners, reach, CAMERA)]
-    directions = _pattern_corners(solution)
-    return lines + [
-        _pyramid(pose, directions, reach, PROJECTOR) for pose in projector_poses(solution)
+    poses = (place.first_from_camera, place.first_from_projector)
+    return [
+        _line(colour, kind, frame, pyramid(pose, directions, content.reach))
+        for colour, pose, directions in zip(colours, poses, corners, strict=True)
+        if pose is not None
     ]
 
 
-def _pattern_corners(solution: Solution) -> NDArray[np.float64]:
-    """Return the directions of the pattern's corners, or the axis where they are unknown.
-
-    A wide pattern's corners may lie beyond the law's range: they are then drawn nearer to the
-    middle, as far out as all four exist.
-    """
-    projector = solution.projector
-    model, width, height = projector.to_model(), projector.width, projector.height
-    if model is None or width is None or height is None:
-        return _AXIS
-    w, h = width - 1, height - 1
-    corners = np.array([[0, 0], [w, 0], [w, h], [0, h]], float)
-    middle = np.array([w / 2, h / 2])
-    for share in np.arange(10, 4, -1) / 10:
-        directions = model.unproject(middle + share * (corners - middle))
-        if np.isfinite(directions).all():
-            return directions
-    return _AXIS
+def _line(colour: str, kind: str, frame: int, segments: Floats) -> dict[str, Any]:
+    rounded = np.round(segments, 6 if kind == "frusta" else 3).tolist()
+    return {"colour": colour, "kind": kind, "frame": frame, "segments": rounded}
 
 
-def _pyramid(
-    first_from_own: RigidTransform, directions: NDArray[np.float64], reach: float, colour: str
-) -> dict[str, Any]:
-    tips = first_from_own.apply(directions * reach)
-    apex = first_from_own.t
-    segments = [[apex, tip] for tip in tips]
-    segments += [[a, b] for a, b in zip(tips, np.roll(tips, -1, axis=0), strict=True)]
-    return {"colour": colour, "segments": np.round(np.array(segments), 6).tolist()}
+def _controls(content: Content, quantities: list[Shown], number: int) -> str:
+    out = ""
+    frames = len(content.places)
+    if frames > 1:
+        least = 1 if len(content.surfaces) > 1 else 0
+        out += (
+            f'<label>Frame <input type="range" name="shown" min="{least}" max="{frames}" '
+            f'value="{least}" step="1"></label><output></output>'
+        )
+    if len(quantities) > 1:
+        out += "".join(
+            f'<label><input type="radio" name="colour-{number}" value="{i}"'
+            f"{' checked' * (i == 0)}> {escape(q.name)}</label>"
+            for i, q in enumerate(quantities)
+        )
+    boxes = [("frusta", True), ("rays", False)]
+    if content.truth is not None:
+        boxes.append(("truth", False))
+    out += "".join(
+        f'<label><input type="checkbox" name="{name}"{" checked" * on}> {name}</label>'
+        for name, on in boxes
+    )
+    return f'<div class="controls">{out}</div>'
+
+
+def _caption(content: Content) -> str:
+    truth = "; dark: their true places" if content.truth is not None else ""
+    return (
+        f"Blue: camera; orange: projector{truth}. Rays: some correspondences, up to where both rays"
+        f" of each pass most closely. Lengths in {content.unit}. Drag to turn, wheel to zoom, "
+        "double click to reset."
+    )
 
 
 def _base64(array: NDArray[Any]) -> str:

@@ -1,6 +1,7 @@
 """A made-up calibration: a bumpy sheet, two frames or more, noise, outliers and a hole."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,13 @@ from mitsuba_endo.evaluate.depth import RayCaster, range_image
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.records.calibration import Calibration, FrameMaps, SurfaceEstimate, TraceRow
+from mitsuba_endo.records.calibration import (
+    Calibration,
+    FrameMaps,
+    Snapshot,
+    SurfaceEstimate,
+    TraceRow,
+)
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.solution import (
     Estimate,
@@ -104,6 +111,21 @@ def _trace() -> list[TraceRow]:
     ]  # fmt: skip
 
 
+def _history(surface: SurfaceEstimate, steps: list[RigidTransform]) -> list[Snapshot]:
+    """Three snapshots in which surface, cameras and projectors move from 10 % off to the result."""
+    faces = [np.array([[0, 1, 2], [2, 1, 3]])]
+    corners = surface.vertices[[0, 149, -150, -1]]
+    return [
+        Snapshot(
+            i, None if i == 0 else 1.0 / i, [FOCAL * (1 + off)] * len(steps),
+            [(1 + off) * corners], faces, [s.inverse() for s in steps],
+            [RigidTransform(PROJECTOR_FROM_CAMERA.R, (1 + off) * PROJECTOR_FROM_CAMERA.t)]
+            * len(steps),
+        )
+        for i, off in enumerate((0.1, 0.03, 0.0))
+    ]  # fmt: skip
+
+
 @pytest.fixture(scope="session")
 def make_calibration() -> Callable[..., Calibration]:
     """Return a maker of calibrations for an image size and a number of frames."""
@@ -120,6 +142,25 @@ def make_calibration() -> Callable[..., Calibration]:
             _frame_maps(name, surface, camera, step, i)
             for i, (name, step) in enumerate(zip(names, steps, strict=True))
         ]
-        return Calibration(_solution(camera, frames, steps), camera, surface, frames, _trace())
+        return Calibration(
+            _solution(camera, frames, steps), camera, surface, frames, _trace(),
+            history=_history(surface, steps),
+        )  # fmt: skip
 
     return make
+
+
+@pytest.fixture(scope="session")
+def with_own_surfaces() -> Callable[[Calibration], Calibration]:
+    """Return a function that gives every frame a surface of its own, in its camera's frame."""
+
+    def own(calibration: Calibration) -> Calibration:
+        surface = calibration.surface
+        moved = {}
+        for k, frame in enumerate(calibration.solution.frames[1:], 1):
+            pose = frame.world_from_camera.to_transform()
+            assert pose is not None
+            moved[k] = replace(surface, vertices=pose.inverse().apply(surface.vertices))
+        return replace(calibration, own_surfaces=moved)
+
+    return own

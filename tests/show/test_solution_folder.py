@@ -33,6 +33,7 @@ FILES = {
     "surface.ply",
     "scene.xml",
     "trace.csv",
+    "history.npz",
     "rendered.exr",
     "observed.exr",
     "report.html",

@@ -6,9 +6,9 @@ from html import escape
 from typing import Any
 
 from ...records.calibration import Snapshot
+from ..content import Content
 from ..figures import headline
 from .choice import Choice
-from .content import Content
 from .cost_chart import add_cost_chart, chart_data
 from .picking import Picker
 from .stage import Stage

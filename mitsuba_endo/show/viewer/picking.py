@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from ..content import Content
 from ..measure import SurfacePoint, distance, pick
-from .content import Content
 
 MARK = (204, 0, 102)
 HINT = "Tick, then click two points on the surface."

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...records.calibration import Calibration
-from .content import Content
+from ..content import Content
 from .controls import Controls
 from .stage import Stage
 

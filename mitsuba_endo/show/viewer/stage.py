@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from ...geometry.transforms import RigidTransform
 from ...records.calibration import Snapshot, SurfaceEstimate
 from ..colours import CAMERA, MISSING, PROJECTOR
+from ..content import Content
 from ..places import Floats, Place, camera_corners, pyramid, solution_corners
 from ..surface_colours import Shown
 from .choice import Choice
-from .content import Content
 from .nodes import Nodes, rgb_bytes
 
 TRUTH = "#3a3a3a"

@@ -1,4 +1,4 @@
-"""What the viewer shows of a result; knows nothing of how it is drawn."""
+"""A result in space, with its truth: what viewer and report show; not how it is drawn."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ...geometry.transforms import RigidTransform
-from ...records.calibration import Calibration, SurfaceEstimate
-from .. import surface_colours
-from ..figures import unit_name
-from ..places import REACH, Floats, Place, Rays, correspondence_rays, places
-from ..surface_colours import Shown
-from ..truth import Truth, load_truth, surface_error
+from ..geometry.transforms import RigidTransform
+from ..records.calibration import Calibration, SurfaceEstimate
+from . import surface_colours
+from .figures import unit_name
+from .places import REACH, Floats, Place, Rays, correspondence_rays, places
+from .surface_colours import Shown
+from .truth import Truth, load_truth, surface_error
 
 RAYS = 60
 """Correspondences drawn for a frame."""
@@ -88,16 +88,15 @@ class Content:
             InputError: as :func:`load_truth`.
         """
         truth = load_truth(path, self.calibration)
-        errors = None
         if truth.surface is not None:
-            errors = [
-                surface_error(surface, _seen_from(truth, k))
+            self.errors = [
+                surface_error(surface, seen_from(truth, k))
                 for k, surface in enumerate(self.surfaces)
             ]
-        self.errors, self.truth = errors, truth
+        self.truth = truth
 
 
-def _seen_from(truth: Truth, frame: int) -> SurfaceEstimate:
+def seen_from(truth: Truth, frame: int) -> SurfaceEstimate:
     """Return the true surface in the true frame of a frame's camera."""
     assert truth.surface is not None
     pose = truth.places[frame].first_from_camera
