@@ -58,15 +58,22 @@ def _own_surfaces(folder: Path, frames: int) -> dict[int, SurfaceEstimate]:
     return {k: load_with_modes(path) for k, path in paths.items() if path.is_file()}
 
 
+def read_observed(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Read what :func:`save_observed` wrote: coordinates (H, W, 2) and which were used (H, W).
+
+    Raises:
+        InputError: missing or damaged file.
+    """
+    seen = read_exr(path)
+    if USED not in seen:
+        raise InputError(f"channel {USED} is missing", str(path), "calibrate again")
+    return _stacked(seen, path), seen[USED] > 0
+
+
 def _frame(folder: Path, name: str, rendered: str, observed: str) -> FrameMaps:
     maps = read_exr(folder / rendered)
-    seen = read_exr(folder / observed)
-    if USED not in seen:
-        raise InputError(f"channel {USED} is missing", str(folder / observed), "calibrate again")
-    used = seen[USED] > 0
-    return FrameMaps(
-        name, _stacked(seen, folder / observed), _stacked(maps, folder / rendered), used
-    )
+    seen, used = read_observed(folder / observed)
+    return FrameMaps(name, seen, _stacked(maps, folder / rendered), used)
 
 
 def _stacked(channels: dict[str, NDArray[np.float32]], path: Path) -> NDArray[np.float32]:

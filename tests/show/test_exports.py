@@ -1,6 +1,7 @@
 """Exports, each read back by the program it is for."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,11 +10,14 @@ import pytest
 
 from mitsuba_endo import backend
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.evaluate.depth import RayCaster, range_image
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.rig import load_rig
 from mitsuba_endo.records.solution import Estimate, Solution, load_solution, save_solution
 from mitsuba_endo.records.surface import load_surface, save_surface
 from mitsuba_endo.show.exports import EXPORTERS, export
+from mitsuba_endo.show.map_names import observed_names
+from mitsuba_endo.show.read_folder import save_observed
 
 POINTS = np.array([[3.0, -5.0, 62.0], [-14.0, 8.0, 75.0], [9.0, 11.0, 58.0]])
 """In the first camera's frame."""
@@ -118,6 +122,56 @@ def test_colmap_projects_as_the_solution(pinhole: Path, tmp_path: Path, calibrat
     assert len(model.points3D) == len(calibration.surface.vertices)
     found = np.array([model.points3D[i + 1].xyz for i in range(5)])
     np.testing.assert_allclose(found, calibration.surface.vertices[:5], atol=1e-4)  # float32 PLY
+
+
+def test_colmap_tracks_are_the_correspondences(tmp_path: Path, calibration: Calibration):
+    """Oracle: pycolmap's tracks: in the camera's image its own projection of the point, in the
+    projector's the observed map read at that pixel, within five RMS residuals of the projection."""
+    pycolmap = pytest.importorskip("pycolmap")
+    pinhole = _with_projector(
+        calibration.solution, law="pinhole", distortion=Estimate(value=[], status="fixed")
+    )
+    frames = []
+    for k, frame in enumerate(calibration.frames):  # maps of the pinhole, with the same noise
+        q = _pinhole_map(calibration, pinhole, k)
+        noise = np.nan_to_num(frame.observed - frame.rendered)
+        frames.append(replace(frame, observed=(q + noise).astype(np.float32)))
+    folder = _write(tmp_path / "result", calibration, pinhole)
+    for name, frame in zip(observed_names([f.name for f in frames]), frames, strict=True):
+        save_observed(folder / name, frame)
+    export(folder, "colmap", tmp_path / "model")
+    model = pycolmap.Reconstruction(str(tmp_path / "model"))
+    named = {image.name: image for image in model.images.values()}
+    for k, frame in enumerate(frames):
+        camera, projector = (named[f"{part}run/frame_{k}.exr"] for part in ("", "projector/"))
+        assert len(camera.points2D) == len(projector.points2D) > 800
+        for seen, lit in list(zip(camera.points2D, projector.points2D, strict=True))[::17]:
+            assert seen.point3D_id == lit.point3D_id
+            point = model.points3D[seen.point3D_id].xyz
+            np.testing.assert_allclose(seen.xy, camera.project_point(point), atol=1e-6)
+            x, y = np.round(seen.xy - 0.5).astype(int)
+            around = frame.observed[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].reshape(-1, 2)
+            assert (np.nanmin(around, 0) - 1e-3 <= lit.xy - 0.5).all()
+            assert (np.nanmax(around, 0) + 1e-3 >= lit.xy - 0.5).all()
+            assert np.linalg.norm(lit.xy - projector.project_point(point)) < 5 * 0.31
+    tracked = [p for p in model.points3D.values() if p.track.length()]
+    assert {p.track.length() for p in tracked} == {2, 4}
+    assert 0.05 < np.mean([p.error for p in tracked]) < 0.31
+
+
+def _pinhole_map(calibration: Calibration, solution: Solution, frame: int) -> np.ndarray:
+    """Project what a frame sees of the sheet by ray casting, NaN where nothing was observed."""
+    pose = solution.frames[frame].projector_from_camera.to_transform()
+    world = solution.frames[frame].world_from_camera.to_transform()
+    model = solution.projector.to_model()
+    assert pose is not None
+    assert world is not None
+    assert model is not None
+    surface, camera = calibration.surface, calibration.camera
+    caster = RayCaster(world.inverse().apply(surface.vertices), surface.faces)
+    points = camera.rays(camera.pixel_grid()) * range_image(caster, camera)[..., None]
+    missing = ~np.isfinite(calibration.frames[frame].observed)
+    return np.where(missing, np.nan, model.project(pose.apply(points)))
 
 
 def test_colmap_refuses_what_it_cannot_express(result: Path, tmp_path: Path):

@@ -1,9 +1,11 @@
 """COLMAP sparse model, text form."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
@@ -13,8 +15,10 @@ from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...records.solution import Solution
 from ...records.surface import load_surface
+from ..map_names import observed_names, own_surface_name
 from .known import camera_pose, known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
+from .tracks import Sightings, sightings
 
 _PIXEL_CENTRE = 0.5
 """COLMAP's first pixel spans 0 to 1; here its centre is 0."""
@@ -26,8 +30,9 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
     """Write cameras.txt, images.txt and points3D.txt.
 
     The projector is a second camera (``FULL_OPENCV``); each frame is two images, ``NAME`` and
-    ``projector/NAME``. Points are the vertices of the first frame's surface in the world's frame,
-    without tracks: the correspondences are dense and stay in their maps.
+    ``projector/NAME``. Points are the surfaces' vertices in the world's frame. Their tracks are the
+    used correspondences at their pixels: in the camera's image the pixel itself, in the projector's
+    the observed coordinate, which alone has noise; the error is in pattern pixels.
 
     Raises:
         InputError: a value was not determined, the projector's law is not ``pinhole``, which is
@@ -40,16 +45,49 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
         )  # fmt: skip
     if solution.surface is None:
         raise InputError("surface is missing", "solution.json", "calibrate again")
-    world = camera_pose(solution.frames[0])
-    points = world.apply(load_surface(folder / solution.surface).vertices)
-    cameras, images = _cameras(solution), _images(solution)
+    points, seen = _points(solution, folder)
+    cameras, images = _cameras(solution), _images(solution, seen)
     with atomic_folder(path) as aside:
         _write(aside / "cameras.txt", cameras)
         _write(aside / "images.txt", images)
-        _write(
-            aside / "points3D.txt",
-            [f"{i} {x!r} {y!r} {z!r} 128 128 128 -1" for i, (x, y, z) in _numbered(points)],
-        )
+        _write(aside / "points3D.txt", _point_lines(points, seen))
+
+
+def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list[Sightings]]:
+    """Return the vertices of all surfaces in the world's frame, and where every frame sees them."""
+    camera, frames = known_camera(solution), solution.frames
+    poses = [camera_pose(frame) for frame in frames]
+    own = [folder / own_surface_name(k) for k in range(1, len(frames))]
+    paths = [folder / str(solution.surface), *(path for path in own if path.is_file())]
+    surfaces = [
+        pose.apply(load_surface(path).vertices) for path, pose in zip(paths, poses, strict=False)
+    ]
+    starts = np.cumsum([0, *(len(s) for s in surfaces)])
+    maps = observed_names([frame.name for frame in frames])
+    seen = []
+    for k, (frame, name) in enumerate(zip(frames, maps, strict=True)):
+        surface = k if len(surfaces) > 1 else 0
+        found = sightings(
+            surfaces[surface], frame, camera, known_projector(solution, frame), poses[k].inverse(),
+            projector_pose(frame), folder / name,
+        )  # fmt: skip
+        seen.append(replace(found, points=found.points + starts[surface]))
+    return np.concatenate(surfaces), seen
+
+
+def _point_lines(points: NDArray[np.float64], seen: list[Sightings]) -> list[str]:
+    """Return a line a point: number, place, grey, mean error, and images with their points."""
+    tracks: list[list[str]] = [[] for _ in points]
+    errors: list[list[float]] = [[] for _ in points]
+    for k, found in enumerate(seen):
+        for i, (point, error) in enumerate(zip(found.points, found.error, strict=True)):
+            tracks[point] += [f"{2 * k + 1} {i}", f"{2 * k + 2} {i}"]
+            errors[point] += [0.0, float(error)]
+    means = [float(np.mean(e)) if e else -1.0 for e in errors]
+    return [
+        f"{i + 1} {x!r} {y!r} {z!r} 128 128 128 {means[i]!r} {' '.join(tracks[i])}"
+        for i, (x, y, z) in enumerate(points.tolist())
+    ]
 
 
 def _cameras(solution: Solution) -> list[str]:
@@ -80,17 +118,23 @@ def _projector_values(projector: ProjectorModel) -> list[float]:
     ]  # fmt: skip
 
 
-def _images(solution: Solution) -> list[str]:
-    """Return two lines an image, the second of which, its 2D points, is empty."""
+def _images(solution: Solution, seen: list[Sightings]) -> list[str]:
+    """Return two lines an image, the second of which holds its 2D points."""
     lines = []
-    for i, frame in enumerate(solution.frames):
+    for i, (frame, found) in enumerate(zip(solution.frames, seen, strict=True)):
         camera_from_world = camera_pose(frame).inverse()
         projector_from_world = projector_pose(frame) @ camera_from_world
         name = frame.name.replace(" ", "_")
-        lines += [_image_line(2 * i + 1, camera_from_world, 1, name), ""]
+        camera = _image_line(2 * i + 1, camera_from_world, 1, name)
         projector = _image_line(2 * i + 2, projector_from_world, i + 2, f"projector/{name}")
-        lines += [projector, ""]
+        lines += [camera, _points_line(found.pixels, found.points)]
+        lines += [projector, _points_line(found.q, found.points)]
     return lines
+
+
+def _points_line(places: NDArray[np.float64], points: NDArray[np.int64]) -> str:
+    shifted = (places + _PIXEL_CENTRE).tolist()
+    return " ".join(f"{x!r} {y!r} {p + 1}" for (x, y), p in zip(shifted, points, strict=True))
 
 
 def _image_line(number: int, pose: RigidTransform, camera: int, name: str) -> str:
@@ -104,10 +148,6 @@ def _padded(coefficients: Sequence[float], count: int) -> list[float]:
 
 def _numbers(values: Sequence[float]) -> str:
     return " ".join(repr(float(v)) for v in values)
-
-
-def _numbered(points: np.ndarray) -> enumerate[list[float]]:
-    return enumerate(points.tolist(), start=1)
 
 
 def _write(path: Path, lines: list[str]) -> None:
