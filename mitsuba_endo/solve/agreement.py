@@ -73,7 +73,7 @@ def agreements(alone: list[FrameStart], optimum: Optimum) -> list[Agreement]:
         alone: the frames solved alone.
         optimum: of all of them with one surface.
     """
-    own = [_support(optimum, k) for k in range(len(alone))]
+    own = [optimum.support(k) for k in range(len(alone))]
     total = np.sum(own, axis=0)
     return [_agreement(a, optimum, k, total - own[k]) for k, a in enumerate(alone)]
 
@@ -84,22 +84,15 @@ def worst(found: list[Agreement]) -> int | None:
     return max(wrong, key=lambda k: (found[k].stray, found[k].ratio), default=None)
 
 
-def _support(optimum: Optimum, frame: int) -> NDArray[np.float64]:
-    """Return the robust weight (V,) of one frame's observations around every vertex."""
-    size = optimum.objective.problem.surfaces[0].lattice.size
-    triangles = optimum.evaluation.triangles[frame]
-    total = np.bincount(triangles.ravel(), np.repeat(optimum.weights[frame], 3), size)
-    return total.astype(np.float64)
-
-
 def _agreement(
     alone: FrameStart, optimum: Optimum, frame: int, others: NDArray[np.float64]
 ) -> Agreement:
-    at = optimum.evaluation
-    common = at.hits[frame] & (others[at.triangles[frame]] >= _SUPPORT).all(1)
+    at, lattice = optimum.evaluation, optimum.objective.problem.surfaces[0].lattice
+    supported = np.all(others[lattice.faces] >= _SUPPORT, axis=1)
+    common = at.hits[frame] & supported[at.faces[frame]]
     if not common.any():
         return Agreement(alone.name, 0.0, np.inf, 0.0)
-    before, after = alone.optimum.evaluation.squared(0), optimum.evaluation.squared(frame)
+    before, after = alone.squared, optimum.evaluation.squared(frame)
     ratio = np.sqrt(np.nanmedian(after[common]) / np.nanmedian(before[common]))
-    lost = (alone.optimum.weights[0] > USED_WEIGHT) & (optimum.weights[frame] <= USED_WEIGHT)
+    lost = alone.used & (optimum.weights[frame] <= USED_WEIGHT)
     return Agreement(alone.name, float(common.mean()), float(ratio), float(lost[common].mean()))

@@ -13,7 +13,7 @@ from ..start.known import known_start
 from ..start.plane import plane_start
 from ..start.result import Candidate, Start
 from ..start.search import search_start
-from .joint import FrameStart, single_plan
+from .joint import FrameStart, frame_start, single_plan
 from .options import Options
 from .plan import Plan
 from .run import optimise
@@ -147,6 +147,5 @@ def solve_alone(
         optimum = optimise(problem, state, options)
         if optimum.outcome is Outcome.INTERRUPTED:
             raise KeyboardInterrupt
-        optimum.evaluation.forget()
-        out.append(FrameStart(map_.name, optimum))
+        out.append(frame_start(optimum, camera, options, start.notes))
     return out

@@ -28,7 +28,9 @@ _NOTHING = 1e-4
 """Share that is left to a direction without information, so that numbers stay finite."""
 
 
-def data_information(optimum: Optimum, reduced: Reduced, variance: float) -> NDArray[np.float64]:
+def data_information(
+    optimum: Optimum, normal: NormalEquations, reduced: Reduced, variance: float
+) -> NDArray[np.float64]:
     """Return the information (G, G) about the global unknowns, in noise variances.
 
     The surface is free: its prior counts for next to nothing. Where some direction is not known
@@ -37,10 +39,11 @@ def data_information(optimum: Optimum, reduced: Reduced, variance: float) -> NDA
 
     Args:
         optimum: where.
-        reduced: its reduced normal equations.
+        normal: its normal equations.
+        reduced: the same, reduced.
         variance: of one coordinate, pattern pixels squared.
     """
-    S = _information(optimum, optimum.state, optimum.normal)
+    S = _information(optimum, optimum.state, normal)
     names = unknowns(optimum.objective.problem.plan, optimum.state)
     scale = np.array([u.scale for u in names])
     weakest = scipy.linalg.eigvalsh(S * np.outer(scale, scale))[:1]

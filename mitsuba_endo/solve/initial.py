@@ -20,9 +20,9 @@ def observations(
     name: str, q: NDArray[np.float32], used: NDArray[np.bool_], camera: CameraModel
 ) -> Observations:
     """Collect the correspondences ``used`` (H, W) of a map (H, W, 2)."""
-    pixels = np.argwhere(used)[:, ::-1]
-    rays = camera.rays(pixels.astype(np.float64))
-    return Observations(name, rays, q[used].T.astype(np.float64), pixels, used.shape)
+    y, x = np.nonzero(used)
+    pixels = np.stack([x, y], -1, dtype=np.int32)
+    return Observations(name, camera, q[used].T.astype(np.float64), pixels)
 
 
 def cell_size(frame: Observations, camera: CameraModel, cell_px: float | None) -> float:
@@ -38,7 +38,7 @@ def cell_size(frame: Observations, camera: CameraModel, cell_px: float | None) -
         covered = np.zeros((y.max() + 1, x.max() + 1), bool)
         covered[y, x] = True
         area = float(covered.sum() * _BLOCK**2)
-        vertices = min(len(frame.rays) / PER_VERTEX, MAX_VERTICES)
+        vertices = min(frame.count / PER_VERTEX, MAX_VERTICES)
         cell_px = float(np.sqrt(area / vertices))
     return cell_px * pixel_angle(camera)
 

@@ -8,16 +8,16 @@ from scipy.spatial.transform import Rotation
 
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
-from ..start.registration import RangeImage, Registration
+from ..start.registration import Registration
 from .initial import initial_rho
-from .lattice import Lattice, lattice_over
+from .lattice import lattice_over
 from .optimum import Optimum
 from .options import Options
 from .plan import Plan
 from .polish import smooth_surfaces
 from .problem import Observations, Problem, curvature_prior, make_problem, prior_weight
 from .state import INTRINSICS, State
-from .surface_result import render_frames
+from .surface_result import USED_WEIGHT, render_frames
 
 MARGIN = 3
 """Cells added around what the frames see: small steps of the cameras then stay on the surface."""
@@ -30,28 +30,51 @@ quadruples the vertices."""
 
 @dataclass(frozen=True, eq=False)
 class FrameStart:
-    """One frame solved alone, in units of its own baseline."""
+    """What is kept of a frame solved alone, in units of its own baseline."""
 
     name: str
-    optimum: Optimum
+    observations: Observations
+    cell: float
+    """Spacing of its surface's lattice, radians."""
+    points: NDArray[np.float64]
+    """(V, 3) vertices of its surface in its camera's frame."""
+    projector_from_camera: RigidTransform
+    intrinsics: NDArray[np.float64]
+    """(9,) as in :data:`INTRINSICS`."""
+    squared: NDArray[np.float64]
+    """(N,) squared residuals, NaN where missed."""
+    used: NDArray[np.bool_]
+    """(N,) correspondences that the robust loss kept."""
+    range: NDArray[np.float64] | None
+    """(H, W) range image of the surface as it is reported, if frames are registered by it."""
+    notes: list[str]
+    """From its start: what the user should know."""
 
-    @property
-    def observations(self) -> Observations:
-        return self.optimum.objective.problem.frames[0]
 
-    @property
-    def lattice(self) -> Lattice:
-        return self.optimum.objective.problem.surfaces[0].lattice
+def frame_start(
+    optimum: Optimum, camera: CameraModel, options: Options, notes: list[str]
+) -> FrameStart:
+    """Keep of the optimum of one frame alone what the joint solution needs.
 
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """(V, 3) vertices of its surface in its camera's frame."""
-        return self.lattice.vertices(self.optimum.state.rho[0])
-
-    def range_image(self, camera: CameraModel, options: Options) -> RangeImage:
-        """Return what the registration of frames works on."""
-        rendering = render_frames(smooth_surfaces(self.optimum, options), camera)[0]
-        return RangeImage(camera.rays(camera.pixel_grid()), rendering.range, camera)
+    The rest, most of all the scene for the ray tracer, is as large as many input maps.
+    """
+    problem, state = optimum.objective.problem, optimum.state
+    lattice = problem.surfaces[0].lattice
+    registered = options.cameras == "registration"
+    return FrameStart(
+        name=problem.frames[0].name,
+        observations=problem.frames[0],
+        cell=lattice.cell,
+        points=lattice.vertices(state.rho[0]),
+        projector_from_camera=state.projector_from_camera[0],
+        intrinsics=state.intrinsics[0],
+        squared=optimum.evaluation.squared(0),
+        used=optimum.weights[0] > USED_WEIGHT,
+        range=render_frames(smooth_surfaces(optimum, options), camera)[0].range
+        if registered
+        else None,
+        notes=notes,
+    )
 
 
 def joint_problem(
@@ -80,7 +103,7 @@ def joint_problem(
         _projector_poses(starts, placed, plan),
         _intrinsics(starts, plan),
     )
-    density = sum(len(s.observations.rays) for s in starts) / lattice.size
+    density = sum(s.observations.count for s in starts) / lattice.size
     focal = np.exp(state.intrinsics[0][INTRINSICS["focal"]][0])
     disparity = float(focal * np.linalg.norm(state.projector_from_camera[0].t))
     prior = curvature_prior(lattice, prior_weight(density), disparity)
@@ -97,7 +120,7 @@ def _cell(starts: list[FrameStart], placed: list[Registration]) -> float:
         near = place.scale * start.points
         far = place.world_from_camera.apply(near)
         ratios.append(float(np.median(np.linalg.norm(near, axis=1) / np.linalg.norm(far, axis=1))))
-    return starts[0].lattice.cell * max(min(ratios), FINEST)
+    return starts[0].cell * max(min(ratios), FINEST)
 
 
 def extended(optimum: Optimum) -> tuple[Problem, State] | None:
@@ -139,7 +162,7 @@ def _missed_points(problem: Problem, optimum: Optimum, frame: int) -> NDArray[np
 def _projector_poses(
     starts: list[FrameStart], placed: list[Registration], plan: Plan
 ) -> list[RigidTransform]:
-    own = [s.optimum.state.projector_from_camera[0] for s in starts]
+    own = [s.projector_from_camera for s in starts]
     poses = [RigidTransform(pose.R, pose.t * p.scale) for pose, p in zip(own, placed, strict=True)]
     if plan.blocks["projector_pose"] == "per_frame":
         return poses
@@ -149,7 +172,7 @@ def _projector_poses(
 
 
 def _intrinsics(starts: list[FrameStart], plan: Plan) -> list[NDArray[np.float64]]:
-    own = np.array([s.optimum.state.intrinsics[0] for s in starts])
+    own = np.array([s.intrinsics for s in starts])
     for name, place in INTRINSICS.items():
         if plan.blocks[name] != "per_frame":
             own[:, place] = np.median(own[:, place], axis=0)

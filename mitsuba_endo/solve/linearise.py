@@ -6,7 +6,7 @@ u and one for v give every pixel's row of the Jacobian. No derivative is written
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -66,30 +66,35 @@ class Linearisation:
         return self.lattice.faces[self.faces]
 
 
-@dataclass(eq=False)
 class FrameRenderer:
-    """Renders and linearises the coordinates of one frame."""
+    """Renders and linearises the coordinates of one frame.
 
-    scene: SurfaceScene
-    rays: NDArray[np.float64]
-    """(N, 3) unit camera rays."""
-    law: str
-    at_centre: bool
-    """Whether the camera stays at the lattice's centre: its rays then never change triangle."""
-    _direction: Any = field(init=False, repr=False)
-    _cached: Any = field(init=False, default=None, repr=False)
+    Args:
+        scene: the surface that the frame sees.
+        rays: (N, 3) unit camera rays.
+        law: of the projector.
+        at_centre: whether the camera stays at the lattice's centre: its rays then never change
+            triangle.
+    """
 
-    def __post_init__(self) -> None:
-        self._direction = _vector(self.rays)
+    def __init__(
+        self, scene: SurfaceScene, rays: NDArray[np.float64], law: str, at_centre: bool
+    ) -> None:
+        self.scene, self.law, self.at_centre = scene, law, at_centre
+        self._direction = _vector(rays)
+        self._cached: Any = None
 
     def render(
         self, state: State, frame: int, surface: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return (2, N) coordinates, (N,) ranges, (N, 3) vertices of the triangles, (N,) hits."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.uint32], NDArray[np.bool_]]:
+        """Return (2, N) coordinates, (N,) ranges, (N,) triangles and (N,) hits.
+
+        Where nothing is hit, the triangle is any.
+        """
         u, v, hit, face, distance = self._trace(state, frame, surface, [], {})
         dr.eval(u, v, hit, face, distance)
-        vertices = self.scene.lattice.faces[face.numpy()]
-        return np.stack([u.numpy(), v.numpy()]), distance.numpy(), vertices, hit.numpy()
+        q = np.stack([u.numpy(), v.numpy()])
+        return q, distance.numpy(), face.numpy().copy(), hit.numpy().copy()
 
     def linearise(
         self, state: State, frame: int, surface: int, active: Sequence[str], terms: int
@@ -159,7 +164,8 @@ class FrameRenderer:
     def _lanes(self, active: Sequence[str], terms: int) -> tuple[list[Any], dict[str, int]]:
         """Return a zero per pixel for every parameter that it depends on, and block widths."""
         widths = {name: terms if name == "distortion" else SIZES[name] for name in active}
-        lanes = [dr.zeros(mi.Float64, len(self.rays)) for _ in range(3 + sum(widths.values()))]
+        size, count = dr.width(self._direction), 3 + sum(widths.values())
+        lanes = [dr.zeros(mi.Float64, size) for _ in range(count)]
         dr.enable_grad(lanes)
         return lanes, widths
 

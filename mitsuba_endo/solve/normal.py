@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .banded import BandedCholesky
+from .coupling import Coupling
 from .linearise import Linearisation
 
 
@@ -21,7 +22,7 @@ class SurfaceBlock:
 
     A: sp.csr_array
     """(V, V) Hessian of data and prior."""
-    B: NDArray[np.float64]
+    B: Coupling
     """(V, G) coupling to the global unknowns."""
     g: NDArray[np.float64]
     """(V,) gradient."""
@@ -35,6 +36,18 @@ class SurfaceBlock:
         return BandedCholesky.of(
             self.A + sp.diags_array(mu * diagonal + floor, format="csr"), self.bandwidth
         )
+
+    def eliminated(self, factor: BandedCholesky) -> NDArray[np.float64]:
+        """Return [B, g]^T A^-1 [B, g], (G + 1, G + 1), from the factor of A.
+
+        With Y = L^-1 [B, g] it is the sum of Y_i^T Y_i over blocks of rows, of which two are held
+        at a time.
+        """
+        total = np.zeros((self.B.shape[1] + 1,) * 2)
+        rhs = (np.column_stack([self.B.rows(i), self.g[i]]) for i in factor.blocks)
+        for Y in factor.forward(rhs):
+            total += Y.T @ Y
+        return total
 
 
 @dataclass(eq=False)
@@ -52,7 +65,7 @@ class NormalEquations:
     @classmethod
     def empty(cls, sizes: list[int], bandwidths: list[int], columns: int) -> "NormalEquations":
         blocks = [
-            SurfaceBlock(sp.csr_array((n, n)), np.zeros((n, columns)), np.zeros(n), width)
+            SurfaceBlock(sp.csr_array((n, n)), Coupling((n, columns)), np.zeros(n), width)
             for n, width in zip(sizes, bandwidths, strict=True)
         ]
         return cls(blocks, np.zeros((columns, columns)), np.zeros(columns))
@@ -76,8 +89,8 @@ class NormalEquations:
         """
         block = self.surfaces[surface]
         block.A = block.A + surface_hessian(lin, weight)
-        block.B += surface_products(lin, weight * lin.J_local) @ chart
-        block.g += surface_products(lin, (weight * residual)[:, None])[:, 0]
+        block.B.add(surface_products(lin, weight, lin.J_local), chart)
+        block.g += surface_products(lin, weight, residual[:, None])[:, 0]
         for J, r in zip(lin.J_local, residual, strict=True):
             weighted = J * weight
             self.D += chart.T @ (weighted @ J.T) @ chart
@@ -98,21 +111,21 @@ class NormalEquations:
         self.schur = reduced.S
         S = reduced.S + mu * np.diag(np.diag(self.D))
         step = -_solve_symmetric(S, reduced.g)
-        surfaces = [-(x[:, -1] + x[:, :-1] @ step) for x in reduced.eliminated]
+        surfaces = [
+            -factor.solve(block.g + block.B @ step)
+            for factor, block in zip(reduced.factors, self.surfaces, strict=True)
+        ]
         return surfaces, step
 
     def reduce(self, mu: float = 0.0) -> "Reduced":
         """Eliminate the surfaces."""
         S, g = self.D.copy(), self.g.copy()
-        factors, eliminated = [], []
-        for block in self.surfaces:
-            factor = block.damped(mu)
-            x = factor.solve(np.column_stack([block.B, block.g]))
-            S -= block.B.T @ x[:, :-1]
-            g -= block.B.T @ x[:, -1]
-            factors.append(factor)
-            eliminated.append(x)
-        return Reduced((S + S.T) / 2, g, factors, eliminated)
+        factors = [block.damped(mu) for block in self.surfaces]
+        for block, factor in zip(self.surfaces, factors, strict=True):
+            total = block.eliminated(factor)
+            S -= total[:-1, :-1]
+            g -= total[:-1, -1]
+        return Reduced((S + S.T) / 2, g, factors)
 
 
 @dataclass(eq=False)
@@ -124,8 +137,7 @@ class Reduced:
     g: NDArray[np.float64]
     """(G,) reduced gradient."""
     factors: list[BandedCholesky]
-    eliminated: list[NDArray[np.float64]]
-    """A^-1 [B, g] of every surface, (V, G + 1)."""
+    """Of every surface's A."""
 
 
 def surface_hessian(lin: Linearisation, weight: NDArray[np.float64]) -> sp.csr_array:
@@ -145,12 +157,14 @@ def surface_hessian(lin: Linearisation, weight: NDArray[np.float64]) -> sp.csr_a
     return sp.csr_array((data, pattern.indices, pattern.indptr), (lattice.size, lattice.size))
 
 
-def surface_products(lin: Linearisation, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return J^T values (V, n) of one frame over its surface, for values (2, n, N) of u and v.
+def surface_products(
+    lin: Linearisation, weight: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return J^T W values (V, n) of one frame over its surface, for values (2, n, N) of u and v.
 
     Summed by triangle first, as in :func:`surface_hessian`.
     """
-    lattice, J = lin.lattice, lin.J_surface
+    lattice, J = lin.lattice, weight * lin.J_surface
     out = np.zeros((values.shape[1], lattice.size))
     for i in range(3):
         for row, (u, v) in zip(out, values.transpose(1, 0, 2), strict=True):

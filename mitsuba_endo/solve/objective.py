@@ -31,8 +31,8 @@ class Evaluation:
     state: State
     hits: list[NDArray[np.bool_]]
     """(N,) pixels of every frame whose ray meets the surface."""
-    triangles: list[NDArray[np.int64]]
-    """(N, 3) vertices that each pixel sees."""
+    faces: list[NDArray[np.uint32]]
+    """(N,) triangle of the lattice that each pixel sees, any where it misses."""
     residuals: list[NDArray[np.float64]]
     """(2, N) rendered minus observed, zero where missed."""
     _only: list[Linearisation] = field(default_factory=list)
@@ -54,10 +54,6 @@ class Evaluation:
         if plan.frames == 1:
             self._only.append(lin)
         return lin
-
-    def forget(self) -> None:
-        """Give back the memory of kept derivatives; they are made again when asked for."""
-        self._only.clear()
 
     def squared(self, frame: int) -> NDArray[np.float64]:
         """(N,) squared residuals of a frame, NaN where missed."""
@@ -173,9 +169,9 @@ def evaluate(problem: Problem, state: State) -> Evaluation:
     problem.move_surfaces(state)
     at = Evaluation(problem, state, [], [], [])
     for k, (frame, renderer) in enumerate(zip(problem.frames, problem.renderers, strict=True)):
-        q, _, triangles, hit = renderer.render(state, k, problem.plan.surface_of(k))
+        q, _, faces, hit = renderer.render(state, k, problem.plan.surface_of(k))
         at.hits.append(hit)
-        at.triangles.append(triangles)
+        at.faces.append(faces)
         at.residuals.append(np.where(hit, q - frame.q, 0.0))
     return at
 

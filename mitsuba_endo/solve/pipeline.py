@@ -11,7 +11,7 @@ from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.solution import LeftOut, Outcome
-from ..start.registration import Registration, register_frames
+from ..start.registration import RangeImage, Registration, register_frames
 from ..start.result import Start
 from .agreement import agreements, worst
 from .drift import drift_prior
@@ -107,13 +107,24 @@ def _own_surfaces(job: Job, say: Progress) -> Fit:
 
 
 def _shared_surface(job: Job, say: Progress) -> Fit:
-    say(0.05, "Searching for a start")
-    with job.timed("start"):
-        maps, starts, left_out = _starts(job)
-    say(0.3, "Solving every frame alone")
-    with job.timed("frames"):
-        plan = make_plan(job.rig, len(maps))
-        alone = solve_alone(maps, starts, job.camera, plan, job.law, job.options)
+    together = _solve_together(job, say)
+    maps = [m for m in job.maps if m.name in together.names]
+    return _finish(job, maps, together.left_out, together.notes, together.optimum, say)
+
+
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Frames that agree on one surface."""
+
+    names: list[str]
+    optimum: Optimum
+    left_out: list[LeftOut]
+    notes: list[str]
+
+
+def _solve_together(job: Job, say: Progress) -> _Together:
+    """Solve every frame alone, register them, and optimise all with one surface."""
+    alone, left_out = _solved_alone(job, say)
     say(0.5, "Registering the frames")
     with job.timed("registration"):
         placed = _place(job, alone)
@@ -123,13 +134,22 @@ def _shared_surface(job: Job, say: Progress) -> Fit:
         for k, p in enumerate(placed)
         if not p.reliable
     ]
-    notes = list(dict.fromkeys(note for k in kept for note in starts[k].notes))
+    notes = list(dict.fromkeys(note for k in kept for note in alone[k].notes))
     say(0.6, "Optimising all frames")
     with job.timed("optimise"):
-        together = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
-    left_out += together.left_out
-    maps = [m for m in maps if m.name in together.names]
-    return _finish(job, maps, left_out, notes + together.doubts, together.optimum, say)
+        found = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
+    return replace(found, left_out=left_out + found.left_out, notes=notes + found.notes)
+
+
+def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameStart], list[LeftOut]]:
+    """Start and solve every frame alone; name those that cannot be used."""
+    say(0.05, "Searching for a start")
+    with job.timed("start"):
+        maps, starts, left_out = _starts(job)
+    say(0.3, "Solving every frame alone")
+    with job.timed("frames"):
+        plan = make_plan(job.rig, len(maps))
+        return solve_alone(maps, starts, job.camera, plan, job.law, job.options), left_out
 
 
 def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
@@ -143,9 +163,9 @@ def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOu
 def _place(job: Job, alone: list[FrameStart]) -> list[Registration]:
     if job.options.cameras == "identity":
         return at_identity(len(alone))
-    return register_frames(
-        [a.range_image(job.camera, job.options) for a in alone], seed=job.options.seed
-    )
+    rays = job.camera.rays(job.camera.pixel_grid())
+    images = [RangeImage(rays, a.range, job.camera) for a in alone if a.range is not None]
+    return register_frames(images, seed=job.options.seed)
 
 
 def _named(reason: str, alone: list[FrameStart]) -> str:
@@ -153,16 +173,6 @@ def _named(reason: str, alone: list[FrameStart]) -> str:
     for k, frame in reversed(list(enumerate(alone))):
         reason = reason.replace(f"against frame {k}:", f"against {frame.name}:")
     return reason
-
-
-@dataclass(frozen=True, eq=False)
-class _Together:
-    """Frames that agree on one surface."""
-
-    names: list[str]
-    optimum: Optimum
-    left_out: list[LeftOut]
-    doubts: list[str]
 
 
 def _optimise_joint(

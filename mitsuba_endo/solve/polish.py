@@ -45,7 +45,7 @@ def _weights(problem: Problem) -> list[float]:
     """Return the weight of every surface's prior, from the observations per vertex."""
     return [
         _WEIGHT
-        * sum(len(f.rays) for k, f in enumerate(problem.frames) if problem.plan.surface_of(k) == i)
+        * sum(f.count for k, f in enumerate(problem.frames) if problem.plan.surface_of(k) == i)
         / surface.lattice.size
         for i, surface in enumerate(problem.surfaces)
     ]

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from ..geometry.cameras import CameraModel
 from .lattice import Lattice
 from .linearise import FrameRenderer, SurfaceScene
 from .plan import Plan
@@ -21,14 +22,26 @@ class Observations:
     """The correspondences of one frame."""
 
     name: str
-    rays: NDArray[np.float64]
-    """(N, 3) unit directions in the camera frame."""
+    camera: CameraModel
     q: NDArray[np.float64]
     """(2, N) observed projector coordinates, pattern pixels."""
-    pixels: NDArray[np.int64]
+    pixels: NDArray[np.int32]
     """(N, 2) image position (x, y) of every observation."""
-    shape: tuple[int, int]
-    """(height, width) of the image."""
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return len(self.pixels)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) of the image."""
+        return self.camera.height, self.camera.width
+
+    @property
+    def rays(self) -> NDArray[np.float64]:
+        """(N, 3) unit directions in the camera frame, computed anew: few steps need them."""
+        return self.camera.rays(self.pixels.astype(np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +123,7 @@ class Problem:
     @property
     def observations(self) -> int:
         """Number of correspondences of all frames."""
-        return sum(len(f.rays) for f in self.frames)
+        return sum(f.count for f in self.frames)
 
     def move_surfaces(self, state: State) -> None:
         """Place the surfaces in Mitsuba at the state's inverse ranges, where rays need them."""

@@ -33,7 +33,7 @@ def separate_surfaces(
         lattice, inverse = _surface(frame, start, camera, options.cell_px)
         disparity = float(start.projector.focal * np.linalg.norm(start.projector_from_camera.t))
         lattices.append(lattice)
-        density = len(frame.rays) / lattice.size
+        density = frame.count / lattice.size
         priors.append(curvature_prior(lattice, prior_weight(density), disparity))
         rho.append(inverse)
     state = State(

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..records.calibration import FrameMaps, SurfaceEstimate
 from .fit import Fit
-from .lattice import Lattice
 from .linearise import FrameRenderer
 from .optimum import Optimum
 
@@ -23,44 +22,26 @@ _AGREE = 0.5
 """Mean robust weight of the observations on a triangle below which they contradict it."""
 
 
-def support(optimum: Optimum, surface: int) -> NDArray[np.float64]:
-    """Return the robust weight (V,) of the observations around every vertex of a surface."""
-    problem = optimum.objective.problem
-    total = np.zeros(problem.surfaces[surface].lattice.size)
-    for k, triangles in enumerate(optimum.evaluation.triangles):
-        if problem.plan.surface_of(k) == surface:
-            weight = np.repeat(optimum.weights[k], 3)
-            total += np.bincount(triangles.ravel(), weight, len(total))
-    return total
-
-
 def seen_faces(optimum: Optimum, surface: int) -> NDArray[np.bool_]:
     """Return which triangles (F,) of a surface were seen.
 
     All corners need support; a triangle that bridges a depth step, steep and with observations
     that contradict it, is none of the surface.
     """
-    lattice, rho = optimum.objective.problem.surfaces[surface].lattice, optimum.state.rho[surface]
+    problem, at = optimum.objective.problem, optimum.evaluation
+    lattice, rho = problem.surfaces[surface].lattice, optimum.state.rho[surface]
     corners = lattice.faces
+    support = np.zeros(lattice.size)
     weight, count = np.zeros(len(corners)), np.zeros(len(corners))
-    at = optimum.evaluation
-    for k, (triangles, hit) in enumerate(zip(at.triangles, at.hits, strict=True)):
-        if optimum.objective.problem.plan.surface_of(k) == surface:
-            face = _face_index(lattice, triangles[hit])
-            weight += np.bincount(face, optimum.weights[k][hit], len(corners))
-            count += np.bincount(face, minlength=len(corners))
+    for k, (faces, hit) in enumerate(zip(at.faces, at.hits, strict=True)):
+        if problem.plan.surface_of(k) == surface:
+            support += optimum.support(k)
+            weight += np.bincount(faces[hit], optimum.weights[k][hit], len(corners))
+            count += np.bincount(faces[hit], minlength=len(corners))
     range_ = 1 / rho[corners]
     steep = np.ptp(range_, axis=1) > _STEEP * lattice.cell * range_.mean(1)
     bridges = steep & (weight < _AGREE * np.maximum(count, 1))
-    return (support(optimum, surface)[corners] >= _SUPPORT).all(1) & ~bridges
-
-
-def _face_index(lattice: Lattice, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the index of the face that each row of vertex triples (N, 3) is."""
-    place = np.array([lattice.size**2, lattice.size, 1])
-    keys = lattice.faces @ place
-    order = np.argsort(keys)
-    return order[np.searchsorted(keys, triangles @ place, sorter=order)]
+    return (support[corners] >= _SUPPORT).all(1) & ~bridges
 
 
 def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) -> SurfaceEstimate:
@@ -102,14 +83,13 @@ def render_frames(optimum: Optimum, camera: CameraModel) -> list[Rendering]:
     rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
     finite = np.isfinite(rays).all(1)
     shape = (camera.height, camera.width)
+    seen_of = [seen_faces(optimum, s) for s in range(problem.plan.surfaces)]
     out = []
     for k, old in enumerate(problem.renderers):
         s = problem.plan.surface_of(k)
-        first = problem.surfaces[s].lattice.faces[0]
         renderer = FrameRenderer(old.scene, rays[finite], problem.law, old.at_centre)
-        coordinates, distance, triangles, hit = renderer.render(state, k, s)
-        face = _face_index(problem.surfaces[s].lattice, np.where(hit[:, None], triangles, first))
-        seen = hit & seen_faces(optimum, s)[face]
+        coordinates, distance, faces, hit = renderer.render(state, k, s)
+        seen = hit & seen_of[s][faces]
         q = np.full((len(rays), 2), np.nan, np.float32)
         q[finite] = np.where(seen, coordinates, np.nan).T
         range_ = np.full(len(rays), np.nan)

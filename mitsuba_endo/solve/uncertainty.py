@@ -4,18 +4,18 @@ The formal covariance trusts the model; the jackknife leaves out image blocks or
 so also sees errors of the model, which dominate on real captures.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .banded import BandedCholesky, BandedInverse
+from .banded import BandedCholesky
+from .coupling import Coupling
 from .information import data_information
-from .normal import Reduced, surface_rows
+from .normal import NormalEquations, Reduced, surface_rows
 from .optimum import Optimum
-from .problem import Problem
-from .robust import Loss
 
 BLOCKS = 4
 """Blocks along each side of an image."""
@@ -25,6 +25,8 @@ MODES = 6
 """Directions kept of what a calibration's error does to a surface."""
 _SMALLEST_BLOCK = 20
 """Observations below which a block is not worth leaving out."""
+_COLUMNS = 32
+"""Columns of the surface's response that are computed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,31 +59,32 @@ def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncerta
             taken there, where less noise passes for relief.
         jackknife: whether to compute the block jackknife too.
     """
-    problem, loss = optimum.objective.problem, optimum.objective.loss
-    reduced = optimum.normal.reduce()
-    inverses = [factor.inverse() for factor in reduced.factors]
-    fitted = _fitted_unknowns(problem, optimum, reduced, inverses)
-    variance, shrinkage = _noise(problem, optimum, loss, fitted)
-    smooth = reported.normal.reduce()
-    information = data_information(reported, smooth, variance)
+    normal = optimum.normal_equations()
+    reduced = normal.reduce()
+    fitted = _fitted_unknowns(optimum, normal, reduced)
+    variance, shrinkage = _noise(optimum, fitted)
+    blocks, frames = _jackknives(optimum, normal, reduced) if jackknife else (None, None)
+    normal = reported.normal_equations()  # one of the two at a time: they are large
+    reduced = normal.reduce()
+    information = data_information(reported, normal, reduced, variance)
     S_inverse = inverse_information(information)
-    formal = shrinkage * variance * S_inverse
-    blocks = _block_contributions(problem, optimum, reduced) if jackknife else None
+    scale = shrinkage * variance
+    errors = [
+        _surface_errors(factor, block.B, S_inverse)
+        for factor, block in zip(reduced.factors, normal.surfaces, strict=True)
+    ]
     return Uncertainty(
         sigma=float(np.sqrt(variance)),
-        formal=formal,
-        jackknife=None if blocks is None else _jackknife(reduced, *blocks[:2]),
-        frame_jackknife=None if blocks is None else _by_frame(reduced, *blocks),
-        rho_std=[
-            np.sqrt(shrinkage * variance * _surface_variance(factor, x[:, :-1], S_inverse))
-            for factor, x in zip(smooth.factors, smooth.eliminated, strict=True)
-        ],
-        rho_modes=[shared_modes(x[:, :-1], formal) for x in smooth.eliminated],
-        information=information / (shrinkage * variance),
+        formal=scale * S_inverse,
+        jackknife=blocks,
+        frame_jackknife=frames,
+        rho_std=[np.sqrt(scale * of_vertices) for of_vertices, _ in errors],
+        rho_modes=[np.sqrt(scale) * modes for _, modes in errors],
+        information=information / scale,
     )
 
 
-def _noise(problem: Problem, optimum: Optimum, loss: Loss, fitted: float) -> tuple[float, float]:
+def _noise(optimum: Optimum, fitted: float) -> tuple[float, float]:
     """Return the noise variance of one coordinate and the factor of the M-estimator's covariance.
 
     With psi(r) = w(r^2) r of two components, a = E|psi|^2 / 2 and b = E[w + w' r^2], the
@@ -89,8 +92,9 @@ def _noise(problem: Problem, optimum: Optimum, loss: Loss, fitted: float) -> tup
     Gaussian noise E[w r^2] = 2 b sigma^2 (Stein). Residuals are smaller than the noise since the
     surface follows it: 2 N - p degrees of freedom are left.
     """
-    objective = optimum.objective
-    r2 = np.concatenate([optimum.evaluation.squared(k) for k in range(len(problem.frames))])
+    objective, loss = optimum.objective, optimum.objective.loss
+    frames = range(len(objective.problem.frames))
+    r2 = np.concatenate([optimum.evaluation.squared(k) for k in frames])
     r2 = r2[np.isfinite(r2)]
     w = loss.weight(r2, objective.scale)
     step = 1e-5 * objective.scale**2
@@ -103,41 +107,53 @@ def _noise(problem: Problem, optimum: Optimum, loss: Loss, fitted: float) -> tup
     return variance, a / b**2 * float(np.mean(w)) * freedom / variance
 
 
-def _fitted_unknowns(
-    problem: Problem, optimum: Optimum, reduced: Reduced, inverses: list[BandedInverse]
-) -> float:
+def _fitted_unknowns(optimum: Optimum, normal: NormalEquations, reduced: Reduced) -> float:
     """Return the effective number of fitted unknowns, tr(H_data H^-1)."""
-    total = float(len(reduced.g))
-    for surface, inverse, block, rho in zip(
-        problem.surfaces, inverses, optimum.normal.surfaces, optimum.state.rho, strict=True
+    objective, total = optimum.objective, float(len(reduced.g))
+    for surface, factor, block, rho in zip(
+        objective.problem.surfaces, reduced.factors, normal.surfaces, optimum.state.rho, strict=True
     ):
-        prior = sp.coo_array(surface.prior.normal(rho, optimum.objective.sigma)[0])
-        row, col = prior.coords
-        entries = inverse.entries(row, col)
+        prior = sp.coo_array(surface.prior.normal(rho, objective.sigma)[0])
+        entries = factor.inverse_entries(*prior.coords)
         total += len(block.g) - float(entries @ prior.data)
     return total
 
 
-def _surface_variance(
-    factor: BandedCholesky, coupling: NDArray[np.float64], S_inverse: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Diagonal of the surface's block of H^-1: A^-1 + X S^-1 X^T with X = A^-1 B."""
-    n = np.arange(len(coupling))
-    return factor.inverse().entries(n, n) + np.einsum("vi,vi->v", coupling @ S_inverse, coupling)
+def _surface_errors(
+    factor: BandedCholesky, B: Coupling, covariance: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return variances (V,) and shared modes of a surface's block of the inverse normal matrix.
 
-
-def shared_modes(
-    coupling: NDArray[np.float64], covariance: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return modes M (V, K) whose product M M^T is X C X^T, but for its weakest directions.
-
-    Vertices follow the global unknowns by X = A^-1 B (V, G), whose covariance is C (G, G). K is
-    at most :data:`MODES`.
+    It is A^-1 + X C X^T with X = A^-1 B and the covariance C of the global unknowns, in noise
+    variances.
     """
-    if not len(covariance):
-        return np.zeros((len(coupling), 0))
-    values, vectors = np.linalg.eigh(covariance)
-    moved = coupling @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    moved = _response(factor, B, scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    n = np.arange(len(moved))
+    return factor.inverse_entries(n, n) + np.einsum("vi,vi->v", moved, moved), shared_modes(moved)
+
+
+def _response(
+    factor: BandedCholesky, B: Coupling, directions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how a surface answers, A^-1 B d (V, n), to directions d (G, n) of the globals."""
+    out = np.empty((B.shape[0], directions.shape[1]))
+    for start in range(0, out.shape[1], _COLUMNS):
+        part = slice(start, start + _COLUMNS)
+        out[:, part] = factor.solve(B @ directions[:, part])
+    return out
+
+
+def shared_modes(moved: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return modes M (V, K) whose product M M^T is that of ``moved`` but for its weakest part.
+
+    Args:
+        moved: (V, G) how vertices follow independent global unknowns of unit variance.
+
+    Returns:
+        At most :data:`MODES` columns.
+    """
     _, strongest = np.linalg.eigh(moved.T @ moved)
     return moved @ strongest[:, ::-1][:, :MODES]
 
@@ -153,42 +169,40 @@ def inverse_information(S: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _block_contributions(
-    problem: Problem, optimum: Optimum, reduced: Reduced
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Split S and the reduced gradient by image block.
+    optimum: Optimum, frame: int, X: NDArray[np.float64]
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Yield the parts (G, G) of S and (G,) of the reduced gradient of a frame's image blocks.
 
     S = sum_b (D_b - B_b^T X) with X = A^-1 B: exact, because D and B are sums over pixels.
 
-    Returns:
-        (K, G, G) and (K, G) contributions, (K,) frame of each block.
+    Args:
+        optimum: where.
+        frame: index of the frame.
+        X: (V, G) of the surface that the frame sees.
     """
-    hessians, gradients, frames = [], [], []
-    plan = problem.plan
-    for k, frame in enumerate(problem.frames):
-        lin, r = optimum.evaluation.linearisation(k), optimum.evaluation.residuals[k]
-        root = np.sqrt(optimum.weights[k])
-        X = reduced.eliminated[plan.surface_of(k)][:, :-1]
-        chart = plan.local_to_global(optimum.state, k)
-        n = len(root)
-        local = (lin.J_local * root).transpose(0, 2, 1).reshape(2 * n, len(chart))
-        surface = surface_rows(lin, root, len(X))
-        weighted = (r * root).ravel()
-        block = image_blocks(frame.pixels, frame.shape)
-        for b in np.unique(block):
-            rows = np.flatnonzero(block == b)
-            if len(rows) < _SMALLEST_BLOCK:
-                continue
-            rows = np.concatenate([rows, rows + n])
-            # Products over pixels first: rows as wide as all unknowns would fill the memory.
-            L, Z, w = local[rows], surface[rows], weighted[rows]
-            H = chart.T @ ((L.T @ L) @ chart - (Z.T @ L).T @ X)
-            hessians.append((H + H.T) / 2)
-            gradients.append(chart.T @ (L.T @ w) - X.T @ (Z.T @ w))
-            frames.append(k)
-    return np.array(hessians), np.array(gradients), np.array(frames)
+    problem = optimum.objective.problem
+    lin, r = optimum.evaluation.linearisation(frame), optimum.evaluation.residuals[frame]
+    root = np.sqrt(optimum.weights[frame])
+    chart = problem.plan.local_to_global(optimum.state, frame)
+    n = len(root)
+    local = (lin.J_local * root).transpose(0, 2, 1).reshape(2 * n, len(chart))
+    surface = surface_rows(lin, root, len(X))
+    weighted = (r * root).ravel()
+    block = image_blocks(problem.frames[frame].pixels, problem.frames[frame].shape)
+    for b in np.unique(block):
+        rows = np.flatnonzero(block == b)
+        if len(rows) < _SMALLEST_BLOCK:
+            continue
+        rows = np.concatenate([rows, rows + n])
+        # Products over pixels first: rows as wide as all unknowns would fill the memory.
+        L, Z, w = local[rows], surface[rows], weighted[rows]
+        coupling = (Z.T @ L).T
+        seen = np.flatnonzero(coupling.any(0))
+        H = chart.T @ ((L.T @ L) @ chart - coupling[:, seen] @ X[seen])
+        yield (H + H.T) / 2, chart.T @ (L.T @ w) - X[seen].T @ (Z.T @ w)[seen]
 
 
-def image_blocks(pixels: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[np.int64]:
+def image_blocks(pixels: NDArray[np.integer], shape: tuple[int, int]) -> NDArray[np.int64]:
     """Return the block index (N,) of pixels (x, y), in a grid over the part that they cover."""
     low = pixels.min(0)
     size = np.ptp(pixels, axis=0) + 1
@@ -196,44 +210,60 @@ def image_blocks(pixels: NDArray[np.int64], shape: tuple[int, int]) -> NDArray[n
     return y * BLOCKS + x
 
 
-def _jackknife(
-    reduced: Reduced, hessians: NDArray[np.float64], gradients: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
-    """Delete-one jackknife covariance from one Newton step without each block.
+def _jackknives(
+    optimum: Optimum, normal: NormalEquations, reduced: Reduced
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Return delete-one jackknife covariances (G, G) over image blocks and over whole frames.
 
-    The step is -(S - S_b)^-1 (g - g_b); g, with the prior's part, vanishes at the optimum. Under
-    pure noise the standard deviations are up to a quarter above the formal ones, because blocks
-    differ in leverage, and scatter by 20-40 % about that, because blocks are few.
+    Under pure noise the blocks' standard deviations are up to a quarter above the formal ones,
+    because blocks differ in leverage, and scatter by 20-40 % about that, because blocks are few.
+    Unknowns of a frame left out keep their value.
     """
-    steps = []
-    for H, g in zip(hessians, gradients, strict=True):
-        rest = reduced.S - H
-        values = np.linalg.eigvalsh(rest)
-        if len(values) and values[0] <= 1e-12 * values[-1]:
-            continue
-        steps.append(np.linalg.solve(rest, g - reduced.g))
+    responses = [
+        _response(factor, block.B, np.eye(len(reduced.g)))
+        for factor, block in zip(reduced.factors, normal.surfaces, strict=True)
+    ]
+    blocks, frames = [], []
+    for k in range(optimum.objective.problem.plan.frames):
+        total_H, total_g = np.zeros_like(reduced.S), np.zeros_like(reduced.g)
+        X = responses[optimum.objective.problem.plan.surface_of(k)]
+        for H, g in _block_contributions(optimum, k, X):
+            blocks.append(_step_without(reduced, H, g))
+            total_H += H
+            total_g += g
+        if total_H.any():
+            frames.append(_step_without_frame(reduced, total_H, total_g))
+    return _delete_one([s for s in blocks if s is not None]), _delete_one(frames)
+
+
+def _step_without(
+    reduced: Reduced, H: NDArray[np.float64], g: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return the Newton step -(S - H)^-1 (g_S - g) without a block, None if it is undetermined.
+
+    g_S, with the prior's part, vanishes at the optimum.
+    """
+    rest = reduced.S - H
+    values = np.linalg.eigvalsh(rest)
+    if len(values) and values[0] <= 1e-12 * values[-1]:
+        return None
+    return np.linalg.solve(rest, g - reduced.g).astype(np.float64)
+
+
+def _step_without_frame(
+    reduced: Reduced, H: NDArray[np.float64], g: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the same without a frame; unknowns that only it tells keep their value."""
+    values, vectors = np.linalg.eigh(reduced.S - H)
+    known = values > 1e-9 * values.max(initial=0.0)
+    inverse = np.where(known, 1 / np.maximum(values, 1e-300), 0.0)
+    return (vectors * inverse) @ (vectors.T @ (g - reduced.g))
+
+
+def _delete_one(steps: list[NDArray[np.float64]]) -> NDArray[np.float64] | None:
+    """Return the jackknife covariance of the steps that leaving one part out causes."""
     if len(steps) < MIN_FRAMES:
         return None
-    change = np.array(steps) - np.mean(steps, axis=0)
-    return (len(steps) - 1) / len(steps) * change.T @ change
-
-
-def _by_frame(
-    reduced: Reduced,
-    hessians: NDArray[np.float64],
-    gradients: NDArray[np.float64],
-    frames: NDArray[np.int64],
-) -> NDArray[np.float64] | None:
-    """Jackknife over whole frames; unknowns of the frame left out keep their value."""
-    names = np.unique(frames)
-    if len(names) < MIN_FRAMES:
-        return None
-    steps = []
-    for k in names:
-        rest = reduced.S - hessians[frames == k].sum(0)
-        g = reduced.g - gradients[frames == k].sum(0)
-        values, vectors = np.linalg.eigh(rest)
-        inverse = np.where(values > 1e-9 * values[-1], 1 / np.maximum(values, 1e-300), 0.0)
-        steps.append(-(vectors * inverse) @ (vectors.T @ g))
-    change = np.array(steps) - np.mean(steps, axis=0)
+    change = np.array(steps)
+    change -= change.mean(0)
     return (len(steps) - 1) / len(steps) * change.T @ change

@@ -29,7 +29,7 @@ class TestBanded:
         A = banded(n, min(width, n - 1))
         row, col = np.nonzero(np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= width)
         order = np.random.default_rng(2).permutation(len(row))
-        found = BandedCholesky.of(sp.csr_array(A), width).inverse().entries(row[order], col[order])
+        found = BandedCholesky.of(sp.csr_array(A), width).inverse_entries(row[order], col[order])
         expected = np.linalg.inv(A)[row[order], col[order]]
         np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-10)
 

@@ -65,10 +65,10 @@ def test_modes_are_the_strongest_part_of_the_covariance():
     root = rng.normal(size=(9, 9))
     covariance = root @ root.T
     full = X @ covariance @ X.T
-    modes = shared_modes(X, covariance)
+    modes = shared_modes(X @ root)
     assert modes.shape == (50, 6)
     values = np.linalg.eigvalsh(full)
     missed = np.linalg.eigvalsh(full - modes @ modes.T)
     assert missed[0] > -1e-9 * values[-1]
     assert missed[-1] == pytest.approx(values[-7], rel=1e-4)
-    assert shared_modes(X[:, :0], covariance[:0, :0]).shape == (50, 0)
+    assert shared_modes(X[:, :0]).shape == (50, 0)

@@ -111,4 +111,4 @@ class TestScale:
         missed = objective.cost(at) - objective.prior_cost(at.state)
         seen = float(objective.loss(at.squared(0), objective.scale).sum())
         worst = objective.scale**2 / 6  # plateau of the biweight
-        assert missed - seen == pytest.approx(worst * len(built.frames[1].rays), rel=1e-9)
+        assert missed - seen == pytest.approx(worst * built.frames[1].count, rel=1e-9)
