@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from mitsuba_endo.capture.solid_fields import Placement
 from mitsuba_endo.capture.vessels import ABSORPTION, vessel_density
 from mitsuba_endo.rendering.untyped import mi
@@ -111,7 +109,8 @@ class Vessels:
 def field_frame(seed: int) -> tuple[Any, Any]:
     """Return the rotation and shift that place a seed's tissue in the field."""
     placement = Placement.of_seed(seed)
-    return mi.Matrix3f(placement.R.tolist()), mi.Vector3f(*np.float32(placement.t).tolist())
+    x, y, z = (float(c) for c in placement.t)
+    return mi.Matrix3f(placement.R.tolist()), mi.Vector3f(x, y, z)
 
 
 def to_field(frame: tuple[Any, Any], point: Any) -> tuple[Any, Any, Any]:

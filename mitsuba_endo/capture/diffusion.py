@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, nnls
+from scipy.optimize import nnls, root_scalar
 
 VARIANCES = 0.04 * 6.0 ** np.arange(5)
 """Variances (per axis) of the Gaussians that make up a profile, in mean free paths squared."""
@@ -34,7 +34,8 @@ def scattering_albedo(reflectance: float, index: float) -> float:
     """Return the single-scattering albedo of a half-space that sends back ``reflectance``."""
     if reflectance >= 1:
         return 1.0
-    return float(brentq(lambda a: diffuse_reflectance(a, index) - reflectance, 0, 1))
+    found = root_scalar(lambda a: diffuse_reflectance(a, index) - reflectance, bracket=(0, 1))
+    return float(found.root)
 
 
 @lru_cache(maxsize=256)

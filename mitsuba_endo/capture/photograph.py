@@ -10,6 +10,7 @@ from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..shapes.mesh import Mesh
+from .checks import check_mesh, check_pattern
 from .effects import apply_effects
 from .effects.encoding import Encoded
 from .settings import CaptureSettings
@@ -53,7 +54,13 @@ def photograph(
         settings: tissue, light, camera effects, samples.
         seed: of the path tracer's and of the effects' noise.
         pattern_size: width and height in pattern pixels. Default: those of ``pattern``.
+
+    Raises:
+        InputError: a mesh in other units or wound at random, no pattern, or a camera that sees
+            nothing or stands inside the wall (see :mod:`.checks`).
     """
+    check_mesh(mesh)
+    check_pattern(pattern)
     backend.ensure()
     from .studio import SetUp, trace
 

@@ -14,6 +14,7 @@ from ..rendering.axes import to_world_from_pose
 from ..rendering.rays import pixel_rays
 from ..rendering.untyped import dr, mi
 from ..shapes.mesh import Mesh
+from .checks import check_view
 from .materials import (
     entering_part,
     index_of_refraction,
@@ -79,6 +80,7 @@ class Studio:
             keys.SURFACE: _surface(setup.mesh, bsdf, medium), **_lights(setup, settings.light),
         })  # fmt: skip
         self._parameters = mi.traverse(self._scene)
+        self._look()
 
     def by(self, light: str, spp: int, seed: int) -> NDArray[np.float32]:
         """Return the radiance (h, w, 3) by the light whose ids begin with ``light``."""
@@ -104,21 +106,24 @@ class Studio:
         return np.array(image, np.float32)[..., :3]
 
     def _spread(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        points, pixels_per_mm = self._seen()
         tissue = self._tissue
         return subsurface_blur(
-            image, points, pixels_per_mm, tissue.mean_free_path, tissue.base_color,
+            image, self._points, self._pixels_per_mm, tissue.mean_free_path, tissue.base_color,
             index_of_refraction(tissue.specular),
         )  # fmt: skip
 
-    def _seen(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return the points (h, w, 3) that pixels see, mm, NaN = none, and pixels per mm (h, w)."""
+    def _look(self) -> None:
+        """Find the points that pixels see (h, w, 3), mm, NaN = none, and pixels per mm (h, w)."""
         ray, width, height = pixel_rays(self._scene.sensors()[0])
-        found = self._scene.ray_intersect_preliminary(ray, coherent=True)
-        distance = dr.select(found.is_valid(), found.t, dr.nan)
-        points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
+        found = self._scene.ray_intersect(ray)
+        hit = found.is_valid()
+        distance = dr.select(hit, found.t, dr.nan)
+        self._points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
         along = np.array(distance, np.float32).reshape(height, width)
-        return points, np.float32(self._setup.camera.K[0, 0]) / along
+        self._pixels_per_mm = np.float32(self._setup.camera.K[0, 0]) / along
+        seen = hit.numpy()
+        away = (dr.dot(found.n, ray.d) > 0).numpy()
+        check_view(float(seen.mean()), float(away[seen].mean()) if seen.any() else 0.0)
 
 
 def mean_intensity(setup: SetUp) -> float:

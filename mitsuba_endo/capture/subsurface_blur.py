@@ -55,7 +55,7 @@ class _Grid:
     def __init__(self, points: NDArray[np.float32], pixels_per_mm: NDArray[np.float32]) -> None:
         self._height, self._width = points.shape[:2]
         flat = points.reshape(-1, 3)
-        known = np.isfinite(flat).all(axis=1)
+        known = ~np.isnan(flat[:, 0])
         self._known = mi.Bool(known)
         self._point = mi.Point3f(np.ascontiguousarray(np.where(known[:, None], flat, 0).T))
         self._scale = mi.Float(np.where(known, pixels_per_mm.ravel(), 0).astype(np.float32))

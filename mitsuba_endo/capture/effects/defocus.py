@@ -14,4 +14,4 @@ def defocus(image: NDArray[np.float32], sigma: float) -> NDArray[np.float32]:
     if sigma == 0:
         return image
     blurred = cv2.GaussianBlur(image, (0, 0), sigma, borderType=cv2.BORDER_REFLECT_101)
-    return blurred.reshape(image.shape)
+    return np.asarray(blurred, np.float32).reshape(image.shape)

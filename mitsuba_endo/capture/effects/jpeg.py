@@ -14,5 +14,5 @@ def jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     encoded, data = cv2.imencode(".jpg", swapped, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not encoded:
         raise ValueError(f"an image of shape {image.shape} cannot be a JPEG")
-    back = cv2.imdecode(data, cv2.IMREAD_UNCHANGED).reshape(image.shape)
-    return np.ascontiguousarray(back[..., ::-1]).astype(np.uint8)
+    back = np.asarray(cv2.imdecode(data, cv2.IMREAD_UNCHANGED), np.uint8).reshape(image.shape)
+    return np.ascontiguousarray(back[..., ::-1])

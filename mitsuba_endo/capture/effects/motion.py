@@ -16,7 +16,8 @@ def motion_blur(image: NDArray[np.float32], length: float, angle: float) -> NDAr
     if length == 0:
         return image
     kernel = line_kernel(length, angle)
-    return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REFLECT_101).reshape(image.shape)
+    blurred = cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REFLECT_101)
+    return np.asarray(blurred, np.float32).reshape(image.shape)
 
 
 def line_kernel(length: float, angle: float) -> NDArray[np.float32]:

@@ -29,4 +29,4 @@ def sensor_noise(
     electrons = np.minimum(electrons, np.float32(full_well))
     if read_noise:
         electrons += np.float32(read_noise) * rng.standard_normal(mean.shape, np.float32)
-    return electrons / np.float32(full_well)
+    return (electrons / np.float32(full_well)).astype(np.float32, copy=False)

@@ -30,26 +30,39 @@ def speckle(
     if contrast == 0:
         return np.ones(shape, np.float32)
     intensity, half = _gamma_table(contrast)
-    # The Gaussian field's autocovariance exp(-d^2 / (4 s^2)) is to be `half` at d = grain / 2.
-    sigma = grain / 4 / np.sqrt(-np.log(half))
-    field = _gaussian_field(shape, sigma, rng)
-    step = _TABLE[1] - _TABLE[0]
-    place = np.clip((field - _TABLE[0]) / step, 0, len(_TABLE) - 1.001)
+    field = _gaussian_field(shape, _kernel(grain, half), rng)
+    step = np.float32(_TABLE[1] - _TABLE[0])
+    place = np.clip((field - np.float32(_TABLE[0])) / step, 0, np.float32(len(_TABLE) - 1.001))
     index = place.astype(np.int32)
     low = intensity[index]
-    return low + (place - index) * (intensity[index + 1] - low)
+    return low + (place - index.astype(np.float32)) * (intensity[index + 1] - low)
 
 
 def _gaussian_field(
-    shape: tuple[int, int], sigma: float, rng: np.random.Generator
+    shape: tuple[int, int], kernel: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """Return white noise filtered by a Gaussian of ``sigma`` pixels, of unit variance."""
-    kernel = cv2.getGaussianKernel(2 * int(np.ceil(4 * sigma)) + 1, sigma, cv2.CV_32F)
+    """Return white noise filtered by ``kernel`` along both axes."""
     margin = len(kernel) // 2
     h, w = shape
     white = rng.standard_normal((h + 2 * margin, w + 2 * margin), np.float32)
-    smooth = cv2.sepFilter2D(white, -1, kernel, kernel)[margin : margin + h, margin : margin + w]
-    return smooth / np.float32((kernel**2).sum())
+    smooth = cv2.sepFilter2D(white, -1, kernel, kernel)
+    return np.asarray(smooth[margin : margin + h, margin : margin + w], np.float32)
+
+
+@functools.lru_cache(maxsize=64)
+def _kernel(grain: float, half: float) -> NDArray[np.float32]:
+    """Return the kernel that gives white noise unit variance and a Gaussian autocovariance.
+
+    The autocovariance is ``half`` at the distance grain / 2, also for grains of a pixel or two,
+    which a sampled Gaussian kernel would make too small: the kernel's transform is the root of
+    the autocovariance's.
+    """
+    reach = int(np.ceil(2.5 * grain)) + 8
+    distance = np.arange(-reach, reach + 1)
+    covariance = half ** ((2 * distance / grain) ** 2)
+    power = np.fft.fft(np.fft.ifftshift(covariance)).real
+    kernel = np.fft.fftshift(np.fft.ifft(np.sqrt(np.maximum(power, 0))).real)
+    return (kernel / np.linalg.norm(kernel)).astype(np.float32)
 
 
 @functools.lru_cache(maxsize=64)

@@ -18,7 +18,7 @@ def vignetting(
     if strength == 0:
         return image
     falloff = np.clip(cosine, 0, 1).astype(np.float32) ** np.float32(4 * strength)
-    return image * falloff[..., None]
+    return (image * falloff[..., None]).astype(np.float32, copy=False)
 
 
 def wide_angle_cosine(height: int, width: int) -> NDArray[np.float32]:
