@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 
 from ..capture.settings import CaptureSettings, Effects, Light, Tissue
 from ..records.validation import Record
-from .ranges import Anything, Section, choose, log, uniform
+from .ranges import Anything, Section, choose, draw_all, log, uniform
 
 Ranges = dict[str, Anything]
 
@@ -84,7 +84,7 @@ class CaptureRanges(Section):
     def draw(self, rng: np.random.Generator) -> CaptureSettings:
         """Return the settings of one photograph."""
         drawn = {
-            section: {name: range_.draw(rng) for name, range_ in getattr(self, section).items()}
+            section: draw_all(getattr(self, section), rng)
             for section in ("tissue", "light", "effects")
         }
         return CaptureSettings.model_validate(

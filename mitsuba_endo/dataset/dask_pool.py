@@ -9,7 +9,7 @@ from .work import Job, Result, prepare, produce
 
 AHEAD = 2
 """Samples handed out per worker: one being made and one waiting."""
-CONNECT_S = 10
+CONNECT_S = 5
 
 
 class DaskPool:
@@ -81,7 +81,7 @@ def _connect(address: str) -> Any:
         return Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            f"no Dask scheduler answers ({error})", f"--dask {address}", "check the address"
+            f"no Dask scheduler answers ({error})", "--dask", "check the address"
         ) from None
 
 

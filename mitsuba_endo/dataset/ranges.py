@@ -81,6 +81,11 @@ def choose(*values: Any) -> Range:
     return Range("choose", values)
 
 
+def draw_all(named: Mapping[str, Range], rng: np.random.Generator) -> dict[str, Any]:
+    """Return a value for every name, whatever order they are written in."""
+    return {name: named[name].draw(rng) for name in sorted(named)}
+
+
 def parse(raw: Any) -> Range:
     """Read a range from its YAML form.
 

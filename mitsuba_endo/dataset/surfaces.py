@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from ..shapes import Mesh, Polyp, make_shape, parameter_names, parse_shape
 from ..shapes.colon import Colon
 from .config import FILE, LUMEN, Polyps, Scene
+from .ranges import draw_all
 from .stances import Facing, InLumen, OnMesh, Stance
 from .workshop import FIGURE, Workshop
 
@@ -47,7 +48,7 @@ def draw_surface(
         mesh = workshop.given(number)
         made = {"file": scene.file, "unit": scene.unit, "side": scene.side}
         return Surface(FILE, mesh, made, [], OnMesh(mesh, scene.side)), scene
-    parameters = {name: range_.draw(rng) for name, range_ in scene.parameters.items()}
+    parameters = draw_all(scene.parameters, rng)
     if "seed" in parameter_names(scene.kind):
         parameters.setdefault("seed", int(rng.integers(2**31)))
     if scene.kind == LUMEN:
