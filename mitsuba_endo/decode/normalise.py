@@ -11,6 +11,10 @@ REACH = 31
 """Window of the local normalisation, pixels: about three periods of the grid."""
 FLOOR = 1.5 / 255
 """Contrast, of full scale, under which nothing is amplified: an 8-bit camera's last bits."""
+OWN = 0.1
+"""Share of a channel's detail that must remain when the other channels are taken away."""
+ABOVE_NOISE = 0.7
+"""Strength of the remaining detail over that of noise; white noise alone has 0.45."""
 BRIGHT = 99.0
 """Percentile of the image that becomes 1 in the first channel."""
 
@@ -35,38 +39,60 @@ def normalise(image: NDArray[np.integer] | NDArray[np.floating]) -> NDArray[np.f
     squares = cv2.boxFilter(gray * gray, -1, window, borderType=cv2.BORDER_REFLECT)
     spread = np.sqrt(np.maximum(squares - mean * mean, 0))
     local = (gray - mean) / (spread + FLOOR)
-    return np.stack([np.minimum(gray / bright, 2), np.clip(local, -4, 4)]).astype(np.float32)
+    return np.stack([np.clip(gray / bright, 0, 2), np.clip(local, -4, 4)]).astype(np.float32)
 
 
 def one_channel(image: NDArray[np.integer] | NDArray[np.floating]) -> NDArray[np.float32]:
-    """Return brightness (H, W) from 0 to 1; of a colour image the channel with most fine detail.
+    """Return brightness (H, W), of full scale; of a colour image the laser's own light.
 
-    A DOE's laser has one colour, and a sum of the channels would add the others' light and noise.
+    That is the channel with most detail less the others' mean: the laser has one colour, while
+    reflections of the lamp from wet tissue are white. If only noise remains, the pattern itself is
+    white, and the channel with most detail is taken as it is.
 
     Raises:
         InputError: not an image, or of another kind of number.
     """
+    values = _checked(image)
+    scale = 1.0 if values.dtype.kind == "f" else 1 / float(np.iinfo(values.dtype).max)
+    planes = np.nan_to_num(np.atleast_3d(values)[..., :3].astype(np.float32)) * np.float32(scale)
+    channels = [np.ascontiguousarray(np.clip(planes[..., k], 0, 1)) for k in range(planes.shape[2])]
+    if len(channels) == 1:
+        return channels[0]
+    return _laser_light(channels)
+
+
+def _laser_light(channels: list[NDArray[np.float32]]) -> NDArray[np.float32]:
+    """Return the laser's own light of three channels, signed: see :func:`one_channel`."""
+    # Squares undo the usual gamma well enough for light to be subtracted from light.
+    squares = [channel * channel for channel in channels]
+    white = np.minimum(np.minimum(squares[0], squares[1]), squares[2])
+    laser = int(np.argmax([_detail(square - white)[0] for square in squares]))
+    others = (squares[laser - 1] + squares[laser - 2]) * np.float32(0.5)
+    own = squares[laser] - others
+    detail, noise = _detail(own)
+    plain = [_detail(square)[0] for square in squares]
+    if detail < ABOVE_NOISE * noise or detail < OWN * plain[laser]:
+        return channels[int(np.argmax(plain))]
+    return np.sign(own) * np.sqrt(np.abs(own))
+
+
+def _checked(image: NDArray[np.generic]) -> NDArray[np.generic]:
     values = np.asarray(image)
-    if (
-        values.ndim not in (2, 3)
-        or 0 in values.shape
-        or values.shape[2:] not in [(), (1,), (3,), (4,)]
-    ):
+    plain = values.ndim in (2, 3) and 0 not in values.shape
+    if not plain or values.shape[2:] not in [(), (1,), (3,), (4,)]:
         raise InputError(f"has shape {values.shape}", "image", "give one gray or colour image")
-    if values.dtype == np.uint8:
-        scale = 1 / 255
-    elif values.dtype == np.uint16:
-        scale = 1 / 65535
-    elif np.issubdtype(values.dtype, np.floating):
-        values, scale = np.nan_to_num(values), 1.0
-    else:
+    if values.dtype not in (np.uint8, np.uint16) and not np.issubdtype(values.dtype, np.floating):
         raise InputError(f"is {values.dtype}", "image", "give 8 or 16 bits or floats")
-    planes = np.atleast_3d(values)[..., :3].astype(np.float32) * np.float32(scale)
-    channels = [np.ascontiguousarray(planes[..., k]) for k in range(planes.shape[2])]
-    return np.clip(max(channels, key=_detail), 0, 1)
+    return values
 
 
-def _detail(channel: NDArray[np.float32]) -> float:
-    """Return the strength of detail as fine as the grid, coarser than pixel noise."""
-    fine = cv2.GaussianBlur(channel, (0, 0), 1.2) - cv2.GaussianBlur(channel, (0, 0), 5.0)
-    return float(fine.std())
+def _detail(light: NDArray[np.float32]) -> tuple[float, float]:
+    """Return the strength of what is as fine as the grid, and of what is finer: noise.
+
+    Of each the 80th percentile, so that a fifth of the image with the grid is enough.
+    """
+    border = cv2.BORDER_REFLECT
+    fine = cv2.boxFilter(light, -1, (3, 3), borderType=border)
+    coarse = cv2.boxFilter(light, -1, (11, 11), borderType=border)
+    parts = ((fine - coarse)[::2, ::2], (light - fine)[::2, ::2])
+    return float(np.percentile(np.abs(parts[0]), 80)), float(np.percentile(np.abs(parts[1]), 80))
