@@ -121,14 +121,16 @@ class Controls:
             self._told = gui.add_markdown(self.picker.words)
             clear = gui.add_button("Clear")
 
-        def toggle(_: Any) -> None:
-            if box.value:
-                self.server.scene.on_click(self.clicked)
-            else:
-                self.server.scene.remove_click_callback(self.clicked)
-
-        box.on_update(toggle)
+        box.on_update(lambda _: self.pick(box.value))
         clear.on_click(lambda _: self._clear())
+
+    def pick(self, wanted: bool) -> None:
+        """Take clicks into the scene for points, or no more."""
+        scene = self.server.scene
+        if wanted:
+            scene.on_click()(self.clicked)
+        else:
+            scene.remove_click_callback("all")
 
     def clicked(self, event: Any) -> None:
         """Pick a point where a click's ray meets the surface."""
