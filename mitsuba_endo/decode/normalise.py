@@ -53,7 +53,7 @@ def one_channel(image: NDArray[np.integer] | NDArray[np.floating]) -> NDArray[np
         InputError: not an image, or of another kind of number.
     """
     values = _checked(image)
-    scale = 1.0 if values.dtype.kind == "f" else 1 / float(np.iinfo(values.dtype).max)
+    scale = {"uint8": 1 / 255, "uint16": 1 / 65535}.get(values.dtype.name, 1.0)
     planes = np.nan_to_num(np.atleast_3d(values)[..., :3].astype(np.float32)) * np.float32(scale)
     channels = [np.ascontiguousarray(np.clip(planes[..., k], 0, 1)) for k in range(planes.shape[2])]
     if len(channels) == 1:
@@ -67,13 +67,11 @@ def _laser_light(channels: list[NDArray[np.float32]]) -> NDArray[np.float32]:
     squares = [channel * channel for channel in channels]
     white = np.minimum(np.minimum(squares[0], squares[1]), squares[2])
     laser = int(np.argmax([_detail(square - white)[0] for square in squares]))
-    others = (squares[laser - 1] + squares[laser - 2]) * np.float32(0.5)
-    own = squares[laser] - others
+    own = squares[laser] - np.float32(0.5) * (squares[laser - 1] + squares[laser - 2])
     detail, noise = _detail(own)
-    plain = [_detail(square)[0] for square in squares]
-    if detail < ABOVE_NOISE * noise or detail < OWN * plain[laser]:
-        return channels[int(np.argmax(plain))]
-    return np.sign(own) * np.sqrt(np.abs(own))
+    if detail < ABOVE_NOISE * noise or detail < OWN * _detail(squares[laser])[0]:
+        return channels[int(np.argmax([_detail(square)[0] for square in squares]))]
+    return (np.sign(own) * np.sqrt(np.abs(own))).astype(np.float32)
 
 
 def _checked(image: NDArray[np.generic]) -> NDArray[np.generic]:
@@ -86,13 +84,13 @@ def _checked(image: NDArray[np.generic]) -> NDArray[np.generic]:
     return values
 
 
-def _detail(light: NDArray[np.float32]) -> tuple[float, float]:
+def _detail(light: NDArray[np.floating]) -> tuple[float, float]:
     """Return the strength of what is as fine as the grid, and of what is finer: noise.
 
-    Of each the 80th percentile, so that a fifth of the image with the grid is enough.
+    Of each the 95th percentile, so that a twentieth of the image with the grid is enough.
     """
     border = cv2.BORDER_REFLECT
     fine = cv2.boxFilter(light, -1, (3, 3), borderType=border)
     coarse = cv2.boxFilter(light, -1, (11, 11), borderType=border)
-    parts = ((fine - coarse)[::2, ::2], (light - fine)[::2, ::2])
-    return float(np.percentile(np.abs(parts[0]), 80)), float(np.percentile(np.abs(parts[1]), 80))
+    detail, noise = (np.abs(part[::2, ::2]) for part in (fine - coarse, light - fine))
+    return float(np.percentile(detail, 95)), float(np.percentile(noise, 95))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..capture.effects import apply_effects
 from ..capture.settings import Effects
+from ..decode.grid_pattern import COLOURS
 from .patterns import GridTexture
 from .textures import albedo, highlights
 from .views import BIT_EDGE, BIT_HIT, BIT_MIXED, LATTICE_UNIT, SUPERSAMPLE, UNLIT, View
@@ -46,6 +47,8 @@ class Look:
     """Lamp light relative to the laser's lines."""
     wet: float
     """Strength of highlights; 0 = dry."""
+    tint: tuple[float, float]
+    """Red and blue of the tissue relative to its green, for colour images."""
 
 
 def random_look(rng: np.random.Generator) -> Look:
@@ -57,6 +60,7 @@ def random_look(rng: np.random.Generator) -> Look:
         between=u(0, 0.25) if rng.random() < 0.7 else 0.0,
         lamp=float(np.exp(u(np.log(0.02), np.log(0.8)))) if rng.random() < 0.5 else 0.0,
         wet=float(np.exp(u(np.log(0.3), np.log(6)))) if rng.random() < 0.6 else 0.0,
+        tint=(u(1, 2.4), u(0.5, 1.1)),
     )
 
 
@@ -72,7 +76,7 @@ def random_effects(rng: np.random.Generator) -> Effects:
         speckle_contrast=round(u(0, 0.85) * (heavy > 0.25), 2),
         speckle_grain=u(1.0, 2.6),
         exposure=float(np.exp(u(np.log(0.18), np.log(1.3)))),
-        colour="gray",
+        colour="colour" if rng.random() < 0.45 else "gray",
         shot=float(np.exp(u(np.log(800), np.log(30000)))),
         read_noise=u(0, 16),
         gamma=float(rng.choice([1.0, 1.8, 2.2])),
@@ -118,15 +122,30 @@ def compose(
     strength = tissue * shading[..., 0]
     laser = _scattered(pattern * strength, look)
     lamp = look.lamp * tissue * shading[..., 1]
+    wet = np.zeros((h, w), np.float32)
     if look.wet:
         wet = look.wet * highlights(shading[..., 2], rng)
-        lamp = lamp + wet * shading[..., 1] * rng.uniform(0.1, 1)
         laser = laser * (1 + wet * rng.uniform(0, 1))
-    image = apply_effects(laser + lamp, effects, int(rng.integers(1 << 30)), laser=laser)
-    # Automatic exposure puts the brightest pixels to `exposure`.
-    top = float(np.percentile((laser + lamp)[::2, ::2], 99.5))
-    visible = strength * np.float32(effects.exposure / max(top, 1e-6)) > VISIBLE
-    return image, _truth(fine, visible, view.flags, grid)
+        wet = wet * shading[..., 1] * rng.uniform(0.1, 1)
+    # The camera exposes for the pattern, or for the brightest of all.
+    metered = laser if rng.random() < 0.6 else laser + lamp + wet
+    gain = effects.exposure / max(float(np.percentile(metered[::2, ::2], 99.5)), 1e-6)
+    image = _photograph(laser, lamp, wet, look, effects, gain, int(rng.integers(1 << 30)))
+    return image, _truth(fine, strength * np.float32(gain) > VISIBLE, view.flags, grid)
+
+
+def _photograph(
+    laser: NDArray[np.float32], lamp: NDArray[np.float32], wet: NDArray[np.float32], look: Look,
+    effects: Effects, gain: float, seed: int,
+) -> NDArray[np.integer]:  # fmt: skip
+    """Return the camera's image of the laser's, the tissue's and the wet film's light."""
+    effects = effects.model_copy(update={"auto_exposure": False, "exposure": gain})
+    if effects.colour == "gray":
+        return apply_effects(laser + lamp + wet, effects, seed, laser=laser)
+    tint = np.array([look.tint[0], 1, look.tint[1]], np.float32)
+    laser_rgb = laser[..., None] * np.array(COLOURS["green"], np.float32)
+    radiance = laser_rgb + lamp[..., None] * tint + wet[..., None]
+    return apply_effects(radiance, effects, seed, laser=laser_rgb)
 
 
 def _lattice(view: View, grid: GridTexture, rng: np.random.Generator) -> NDArray[np.float32]:

@@ -12,11 +12,11 @@ from torch.nn.functional import (
 
 from .examples import Example
 
-CODE, CONFIDENCE, EDGE = 0.5, 0.3, 0.15
+CODE, CONFIDENCE, EDGE = 0.5, 0.3, 0.5
 """Weights beside the phase's."""
 SURE = 0.1
 """Periods of error, on either axis, below which the network should trust itself."""
-EDGE_BALANCE = 4.0
+EDGE_BALANCE = 6.0
 """Weight of an edge pixel: there are few."""
 
 
@@ -48,9 +48,11 @@ def losses(output: Tensor, truth: Example) -> Losses:
     code = cross_entropy(output[:, 4:7], asked, ignore_index=-1, reduction="sum")
     code = code / (asked >= 0).sum().clamp(min=1)
     right = lit & (chord.detach().amax(1) < 2 * torch.pi * SURE)
-    confidence = binary_cross_entropy_with_logits(output[:, 7], right.float())
+    confidence = binary_cross_entropy_with_logits(output[:, 7], right.to(output.dtype))
     balance = torch.tensor(EDGE_BALANCE, device=output.device)
-    edge = binary_cross_entropy_with_logits(output[:, 8], truth["edge"].float(), pos_weight=balance)
+    edge = binary_cross_entropy_with_logits(
+        output[:, 8], truth["edge"].to(output.dtype), pos_weight=balance
+    )
     return Losses(phase, code, confidence, edge)
 
 

@@ -41,8 +41,10 @@ def highlights(facing: Image, rng: np.random.Generator) -> Image:
     rough = rough + rng.uniform(0.5, 2) * clouds(facing.shape, float(rng.uniform(10, 40)), rng)
     field = rng.uniform(1, 12) * facing + rng.uniform(0.3, 1) * rough
     level = np.quantile(field[::3, ::3], 1 - share)
-    width = rng.uniform(0.05, 0.6)
-    return np.clip((field - level) / width, 0, 1).astype(np.float32)
+    # From sharp spots to a veil far around them.
+    width = float(np.exp(rng.uniform(np.log(0.05), np.log(3))))
+    grains = np.exp(rng.uniform(0, 0.7) * clouds(facing.shape, float(rng.uniform(1.5, 4)), rng))
+    return (np.clip((field - level) / width + 0.5, 0, 1) * grains).astype(np.float32)
 
 
 def without_pattern(shape: tuple[int, int], rng: np.random.Generator) -> Image:
