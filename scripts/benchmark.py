@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from benchmarks import (
     bundle_adjustment,
+    dataset,
     emitter_cost,
     first_order,
     full_resolution,
@@ -39,6 +40,7 @@ BENCHMARKS = {
         scaling,
         shared_rig,
         verdicts,
+        dataset,
     )
 }
 
