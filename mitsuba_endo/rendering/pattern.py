@@ -53,6 +53,15 @@ def make_pattern(name: str, **parameters: Any) -> NDArray[np.float32]:
     """Return the linear RGB image (H, W, 3) of the pattern called ``name``.
 
     Raises:
+        InputError: as :func:`parse_pattern`.
+    """
+    return parse_pattern(name, **parameters).image()
+
+
+def parse_pattern(name: str, **parameters: Any) -> GridPattern | CodedGrid:
+    """Return the record of the pattern called ``name``.
+
+    Raises:
         InputError: unknown pattern, unknown parameter, or a value that is out of range.
     """
     if name not in PATTERNS:
@@ -61,7 +70,7 @@ def make_pattern(name: str, **parameters: Any) -> NDArray[np.float32]:
             f"there is no pattern called {name!r}", "pattern", f"choose one of {known}"
         )
     try:
-        return PATTERNS[name](**parameters).image()
+        return PATTERNS[name](**parameters)
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"])

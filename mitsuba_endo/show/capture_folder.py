@@ -11,8 +11,10 @@ from ..records.correspondence import save_map, write_exr
 from ..records.known_input import known_rig, save_rig
 from ..records.solution import save_solution
 from ..records.surface import save_surface
+from ..rendering.pattern_truth import coded_grid, grid_truth
 from ..rendering.render import Capture
 from ..rendering.scene import LoadedScene
+from .grid_truth_file import GRID_TRUTH, save_grid_truth
 from .tonemap import tonemap
 
 MAP = "map.exr"
@@ -28,7 +30,8 @@ def write_capture_folder(path: str | Path, capture: Capture, loaded: LoadedScene
     Files: ``image.exr`` (linear RGB), ``image.png``, ``map.exr`` (projector coordinates of lit
     pixels), ``depth.exr`` (mm along the optical axis), ``normals.exr`` (camera frame),
     ``masks.exr`` (lit by the projector; surface seen), ``rig.yaml`` (without what is to be found),
-    ``truth.json`` and ``truth_surface.ply`` (mm, camera frame).
+    ``truth.json`` and ``truth_surface.ply`` (mm, camera frame); for ``pattern:coded`` also
+    ``truth_grid.exr``: phase, node and code at every pixel, also where it is not lit.
 
     Raises:
         InputError: the folder cannot be written.
@@ -45,6 +48,10 @@ def write_capture_folder(path: str | Path, capture: Capture, loaded: LoadedScene
         save_rig(folder / RIG, known_rig(capture.truth))
         save_solution(folder / TRUTH, capture.truth.model_copy(update={"surface": SURFACE}))
         save_surface(folder / SURFACE, _surface_in_camera(loaded))
+        grid = coded_grid(loaded)
+        if grid is not None:
+            truth = grid_truth(grid, capture.projector, loaded.pattern_size())
+            save_grid_truth(folder / GRID_TRUTH, truth)
 
 
 def _surface_in_camera(loaded: LoadedScene) -> SurfaceEstimate:
