@@ -42,7 +42,7 @@ def decode_bits(
     bits = signal > 0
     uncertain = np.abs(signal) < doubt
     count = uncertain.sum(0)
-    low, high = _stripe_index(bits & ~uncertain), _stripe_index(bits | uncertain)
+    low, high = stripe_index(bits & ~uncertain), stripe_index(bits | uncertain)
     neighbours = np.abs(low - high) == 1
     middle = (low + 0.5) * stripe - 0.5
     edge = np.maximum(low, high) * float(stripe) - 0.5
@@ -56,7 +56,7 @@ def _stripes(size: int, stripe: int) -> int:
     return -(-size // stripe)
 
 
-def _stripe_index(bits: NDArray[np.bool_]) -> NDArray[np.int64]:
+def stripe_index(bits: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Turn Gray bits, coarsest first, into numbers: each binary digit is the parity so far."""
     binary = np.logical_xor.accumulate(bits, axis=0)
     weight = 1 << np.arange(len(bits), dtype=np.int64)[::-1]

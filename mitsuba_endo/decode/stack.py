@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, NothingDecodedError
 from .agreement import agreeing
 from .gray_code import CERTAIN, bit_images, decode_bits
+from .gray_interpolation import interpolate
 from .phase_shift import phase_images, refine, unroll_coarsest, wrapped_coordinate
 from .plan import AXES, Axis, StackPlan
 
@@ -217,7 +218,9 @@ def _decode_gray(
         # The threshold is the mean of two measured levels, so its own noise counts too.
         signal, spread = (2 * images - white - black) / safe, np.sqrt(6) * noise
     doubt = np.maximum(CERTAIN, BIT_OVER_NOISE * spread / safe)
-    return decode_bits(signal, doubt, size, plan.stripe), contrast
+    q = decode_bits(signal, doubt, size, plan.stripe)
+    # With phase images, the fringe is all that is asked of the code.
+    return q if plan.periods else interpolate(q, signal, spread / safe, plan.stripe), contrast
 
 
 def _checked(
