@@ -1,9 +1,9 @@
 """Places within the stripes of a Gray code, from how far the bits have turned.
 
-A pixel integrates over its own width and the lens's blur, so near the edge of a stripe the bit that
-changes there is neither dark nor bright, and the nearer the edge the less so. How near follows
-without any model of the blur: places within stripes are equally frequent, so the share of the pixels
-whose bit has turned less is the distance from the edge, in half stripes.
+A pixel integrates over its own width and the lens's blur, so near the edge of a stripe the bit
+that changes there is neither dark nor bright, and the nearer the edge the less so. How near
+follows without any model of the blur: places within stripes are equally frequent, so the share of
+the pixels whose bit has turned less is the distance from the edge, in half stripes.
 """
 
 import numpy as np

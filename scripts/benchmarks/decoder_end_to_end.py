@@ -1,0 +1,102 @@
+"""Four photographs of a scene, decoded and calibrated, against true maps with the same noise."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_endo.decode.grid.decode import decode_image
+from mitsuba_endo.decode.grid.network import Network, load_network
+from mitsuba_endo.evaluate.shape import compare_shape
+from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.records.calibration import SurfaceEstimate
+from mitsuba_endo.records.correspondence import CorrespondenceMap
+from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig, Scale
+from mitsuba_endo.shapes import Mesh
+from mitsuba_endo.solve.calibrate import calibrate
+
+from .decoder_scenes import FOCAL, PATTERN, Kind, Shot, camera, photograph_at, surface
+from .report import Figure
+
+NAME = "decoder_end_to_end"
+_figure = partial(Figure, NAME)
+FRAMES = 4
+GUESS = 1.1
+"""The focal length's guess over the truth."""
+
+
+def run(quick: bool) -> list[Figure]:
+    """Calibrate a colon and a stomach from images and from maps."""
+    network = load_network()
+    kinds: tuple[Kind, ...] = ("colon", "stomach")
+    return [f for kind in kinds for f in judge(kind, *shoot_frames(kind, 11, quick), network)]
+
+
+def shoot_frames(kind: Kind, seed: int, quick: bool) -> tuple[Mesh, list[Shot]]:
+    """Photograph a surface four times, some mm and degrees apart; the projector moves too."""
+    rng = np.random.default_rng((seed, 3))
+    mesh = surface(kind, seed)
+    lens = camera(rng, *((240, 180) if quick else (480, 360)))
+    shots = []
+    for k in range(FRAMES):
+        at = RigidTransform.of(rng.normal(0, 0.05, 3), rng.normal(0, [2.0, 2.0, 3.0]))
+        own = RigidTransform.of(
+            np.array([0.03, -0.1, 0.05]) + rng.normal(0, 0.02, 3),
+            np.array([-5.8, 1.2, 1.6]) + rng.normal(0, 0.3, 3),
+        )
+        shots.append(photograph_at(mesh, lens, at, own, 10 * seed + k, 8 if quick else 32))
+    return mesh, shots
+
+
+def judge(kind: Kind, mesh: Mesh, shots: Sequence[Shot], network: Network) -> list[Figure]:
+    """Return the errors of the calibration from images, and from maps with the same noise."""
+    decoded = [decode_image(shot.image(False, k)[0], network, PATTERN).q
+               for k, shot in enumerate(shots)]  # fmt: skip
+    noise = float(np.median([_noise(q, shot) for q, shot in zip(decoded, shots, strict=True)]))
+    true = [_noisy(shot, noise, seed) for seed, shot in enumerate(shots)]
+    focal, shape, frames = _calibrated(mesh, shots, decoded)
+    _, ideal, _ = _calibrated(mesh, shots, true)
+    return [
+        _figure(
+            f"{kind}: decoder's noise, robust standard deviation", noise, "pattern px", "lower"
+        ),
+        _figure(f"{kind}: focal error from images", focal, "%", "lower", 0.5),
+        _figure(f"{kind}: shape RMSE from images", shape, "mm", "lower"),
+        _figure(f"{kind}: shape RMSE from true maps with that noise", ideal, "mm", "lower"),
+        _figure(f"{kind}: ratio of these", shape / ideal, "", "lower", 2.0),
+        _figure(f"{kind}: frames used", frames, f"of {FRAMES}", "higher", FRAMES),
+    ]
+
+
+def _noise(q: NDArray[np.float32], shot: Shot) -> float:
+    error = (q - shot.q)[np.isfinite(q[..., 0]) & shot.lattice_known]
+    return 1.4826 * float(np.median(np.abs(error)))
+
+
+def _noisy(shot: Shot, noise: float, seed: int) -> NDArray[np.float32]:
+    """Return true coordinates of the lit pixels with Gaussian noise."""
+    q = np.where(shot.lattice_known[..., None], shot.q, np.nan)
+    rng = np.random.default_rng((seed, 4))
+    return (q + noise * rng.standard_normal(q.shape)).astype(np.float32)
+
+
+def _calibrated(
+    mesh: Mesh, shots: Sequence[Shot], maps: Sequence[NDArray[np.float32]]
+) -> tuple[float, float, int]:
+    """Return the focal length's error, %, the shape's RMSE, mm, and the frames used."""
+    rig = Rig(
+        camera=Camera.from_model(shots[0].camera),
+        projector=Projector(
+            width=PATTERN.width, height=PATTERN.height, focal=Focal(value=GUESS * FOCAL)
+        ),
+        scale=Scale(baseline=float(np.linalg.norm(shots[0].projector_from_camera.t))),
+    )
+    named = [CorrespondenceMap(q, f"frame {k}") for k, q in enumerate(maps)]
+    found = calibrate(named, rig)
+    focal = found.solution.projector.focal.value
+    error = 100 * abs(focal / FOCAL - 1) if isinstance(focal, float) else np.inf
+    camera_from_world = shots[0].world_from_camera.inverse()
+    truth = SurfaceEstimate(camera_from_world.apply(mesh.vertices), mesh.faces)
+    shape = compare_shape(found.surface, truth, shots[0].camera)
+    return error, np.inf if isinstance(shape, str) else shape.rmse, len(found.frames)
