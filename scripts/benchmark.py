@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from benchmarks import (
     bundle_adjustment,
+    capture,
     dataset,
     emitter_cost,
     first_order,
@@ -41,6 +42,7 @@ BENCHMARKS = {
         shared_rig,
         verdicts,
         dataset,
+        capture,
     )
 }
 

@@ -8,8 +8,7 @@ from mitsuba_endo.capture.settings import CaptureSettings, Light, Tissue
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.shapes import make_shape
-
-from .plane_under_grid import PlaneUnderGrid, plane_under_grid
+from scripts.benchmarks.plane_under_grid import PlaneUnderGrid, plane_under_grid
 
 SMALL = CameraModel("opencv", 48, 36, np.array([[40.0, 0, 22.8], [0, 40, 18.4], [0, 0, 1]]))
 

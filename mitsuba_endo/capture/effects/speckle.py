@@ -35,7 +35,8 @@ def speckle(
     place = np.clip((field - np.float32(_TABLE[0])) / step, 0, np.float32(len(_TABLE) - 1.001))
     index = place.astype(np.int32)
     low = intensity[index]
-    return low + (place - index.astype(np.float32)) * (intensity[index + 1] - low)
+    field = low + (place - index.astype(np.float32)) * (intensity[index + 1] - low)
+    return np.asarray(field, np.float32)
 
 
 def _gaussian_field(
