@@ -111,7 +111,7 @@ def measure_polyp(
     if not (np.isfinite(size) and height > _LEAST_HEIGHT * np.median(patch.noise)):
         raise InputError("nothing in the circle stands out of the wall", "outline")
     sectors = _sectors(patch, found)
-    left_out = [_size(_fit(patch, found, sectors != k)) for k in np.unique(sectors)]
+    left_out = np.array([_size(_fit(patch, found, sectors != k)) for k in np.unique(sectors)])
     n = len(left_out)
     points = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
     shifts = [_size(_fit(patch, found, every, mode)) - size for mode in patch.modes.T]
