@@ -76,4 +76,4 @@ def photograph(
 
 def cosine_to_axis(camera: CameraModel) -> NDArray[np.float64]:
     """Return the (h, w) cosine of the angle between each pixel's ray and the optical axis."""
-    return np.nan_to_num(camera.rays(camera.pixel_grid())[..., 2])
+    return np.nan_to_num(camera.grid_rays[..., 2])

@@ -22,19 +22,19 @@ TISSUE: Ranges = {
     "vessel_contrast": uniform(0.2, 0.7),
     "vessel_scale": uniform(4.0, 9.0),
     "relief": uniform(0.05, 0.2),
-    "mean_free_path": uniform(0.25, 0.7),
+    "mean_free_path": uniform(0.1, 0.4),
     "seed": uniform(0, 999_999),
 }
-LIGHT: Ranges = {"lamp": choose(0.0, 0.0, 0.02, 0.1, 0.3)}
+LIGHT: Ranges = {"lamp": choose(0.0, 0.0, 0.01, 0.03, 0.1)}
 EFFECTS: Ranges = {
     "vignetting": uniform(0.3, 1.2),
-    "defocus": uniform(0.3, 1.0),
-    "motion": choose(0.0, 0.0, 0.0, 1.0, 2.0),
+    "defocus": uniform(0.2, 0.8),
+    "motion": choose(0.0, 0.0, 0.0, 0.7, 1.5),
     "motion_angle": uniform(-3.14159, 3.14159),
-    "speckle_contrast": uniform(0.0, 0.35),
-    "speckle_grain": uniform(1.2, 3.0),
-    "exposure": log(0.8, 4.0),
-    "shot": log(1500.0, 20000.0),
+    "speckle_contrast": uniform(0.05, 0.3),
+    "speckle_grain": uniform(1.0, 2.2),
+    "exposure": log(0.8, 2.5),
+    "shot": log(2500.0, 30000.0),
     "read_noise": uniform(3.0, 25.0),
     "jpeg_quality": choose(None, None, 90, 70),
 }

@@ -55,7 +55,7 @@ DEFAULT_SCENES: list[dict[str, Any]] = [
         "parameters": {
             "distance": [35, 75], "radius": [60, 90], "angle_x": 1.15, "angle_y": 1.15,
             "fold_depth": [3, 7], "fold_spacing": [12, 22], "furrow_width": [3.5, 6],
-            "orientation": [-3.14159, 3.14159], "winding": [0.2, 0.7], "edge": 1.0,
+            "orientation": [-3.14159, 3.14159], "winding": [0.2, 0.7], "edge": 1.3,
         },
     },
     {
@@ -64,13 +64,13 @@ DEFAULT_SCENES: list[dict[str, Any]] = [
             "distance": [35, 75], "width": 130, "height": 130, "radius": [100, 300],
             "ripple_depth": [0.5, 4], "ripple_x": [4, 9], "ripple_y": [4, 9],
             "dent_depth": [-6, 6], "dent_at_x": [-15, 15], "dent_at_y": [-15, 15],
-            "dent_spread": [30, 120], "edge": 0.8,
+            "dent_spread": [30, 120], "edge": 1.2,
         },
     },
     {
         "kind": "concave_sphere",
         "parameters": {
-            "distance": [30, 65], "radius": [40, 90], "angle_x": 1.2, "angle_y": 1.2, "edge": 0.8,
+            "distance": [30, 65], "radius": [40, 90], "angle_x": 1.2, "angle_y": 1.2, "edge": 1.1,
         },
     },
     {
@@ -202,7 +202,7 @@ class CameraRanges(Section):
     width: PositiveInt = 320
     height: PositiveInt = 240
     """Pixels, the same for all samples."""
-    fov: Degrees = uniform(55.0, 80.0)
+    fov: Degrees = uniform(50.0, 72.0)
     """From left to right without distortion."""
     aspect: Positive = uniform(0.995, 1.005)
     """fy / fx."""

@@ -107,8 +107,7 @@ class _Judge:
 
     def _from_behind(self, world_from_camera: RigidTransform) -> float:
         """Return the share of the surface's image in which its faces point away."""
-        rays = self.camera.rays(self.camera.pixel_grid()).reshape(-1, 3)
-        ways = world_from_camera.rotate(rays)
+        ways = world_from_camera.rotate(self.camera.grid_rays.reshape(-1, 3))
         met = self.scene.cast(world_from_camera.t, ways)
         a, b, c = (self.mesh.vertices[self.mesh.faces[met.triangle, i]] for i in range(3))
         away = np.einsum("ni,ni->n", np.cross(b - a, c - a), ways) > 0

@@ -61,7 +61,7 @@ def truth_maps(
 ) -> TruthMaps:
     """Compute the truth of one view with one ray through every pixel's centre."""
     shape = camera.height, camera.width
-    ways = world_from_camera.rotate(camera.rays(camera.pixel_grid()).reshape(-1, 3))
+    ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
     hits = scene.cast(world_from_camera.t, ways)
     points = world_from_camera.inverse().apply(hits.points)
     q = np.where(hits.hit[:, None], projector.project(projector_from_camera.apply(points)), np.nan)

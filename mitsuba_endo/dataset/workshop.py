@@ -17,7 +17,7 @@ from .streams import stream
 
 FIGURE = "rabbit"
 FIGURE_HEIGHT = 60.0
-FIGURE_EDGE = 0.8
+FIGURE_EDGE = 1.0
 KEPT = 4
 """Patterns held in memory by a process."""
 

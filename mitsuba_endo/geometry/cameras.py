@@ -6,6 +6,7 @@ Adding a model is one class with ``@register_camera`` and nothing else.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -156,3 +157,8 @@ class CameraModel:
         """Return the pixel centres (height, width, 2)."""
         x, y = np.meshgrid(np.arange(self.width), np.arange(self.height))
         return np.stack([x, y], -1).astype(np.float64)
+
+    @cached_property
+    def grid_rays(self) -> NDArray[np.float64]:
+        """Unit directions (height, width, 3) of all pixel centres; inverting the lens takes long."""
+        return self.rays(self.pixel_grid())

@@ -59,7 +59,7 @@ class MeshScene:
             projector_from_camera: its pose relative to the camera.
             size: pattern (width, height); coordinates outside are missing. None: no limit.
         """
-        rays = camera.rays(camera.pixel_grid()).reshape(-1, 3)
+        rays = camera.grid_rays.reshape(-1, 3)
         seen = self.cast(world_from_camera.t, world_from_camera.rotate(rays))
         points, hit = seen.points, seen.hit
         camera_from_world = world_from_camera.inverse()

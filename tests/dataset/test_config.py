@@ -109,5 +109,5 @@ def test_what_is_saved_is_plain_yaml(tmp_path: Path):
     """Oracle: a reader that knows nothing of the package."""
     save_config(tmp_path / "c.yaml", Config())
     data = yaml.safe_load((tmp_path / "c.yaml").read_text())
-    assert data["camera"]["fov"] == [55.0, 80.0]
-    assert data["capture"]["light"]["lamp"] == {"choose": [0.0, 0.0, 0.02, 0.1, 0.3]}
+    assert data["camera"]["fov"] == [50.0, 72.0]
+    assert data["capture"]["light"]["lamp"] == {"choose": [0.0, 0.0, 0.01, 0.03, 0.1]}
