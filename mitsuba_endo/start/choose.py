@@ -26,6 +26,8 @@ EXPLAINED = 1.5
 HOPELESS = 4.0
 """Times the cost of a state that explains the data: not refined further."""
 FINALISTS = 3
+_PATIENT = 200
+"""Steps towards a minimum that is reported; valleys of weak relief take a hundred."""
 SIMILAR_COST = 1.2
 """Minima whose costs have at most this ratio are reported as a possible confusion."""
 
@@ -89,12 +91,32 @@ def refine(
     return ranked([*minima, *_valid(redescended, data)])
 
 
-def finish(problem: Problem, minima: list[Minimum], data: Correspondences) -> list[Minimum]:
-    """Finish the best minimum, and those of similar cost, on a larger sample."""
-    limit = SIMILAR_COST * minima[0].cost
-    close = [m for m in minima[:FINALISTS] if m.cost <= limit]
-    finished = [_redescend(problem, _on(m.state, data), data) for m in close]
-    return [*_valid(finished, data), *minima[len(close) :]]
+def finish(
+    problem: Problem, minima: list[Minimum], data: Correspondences, more: Correspondences
+) -> list[Minimum]:
+    """Finish the best minimum, and those of similar cost, on a larger sample.
+
+    In a valley several of these are on their way to one minimum: they go on to it first.
+
+    Args:
+        problem: what is to be found.
+        minima: best first.
+        data: the sample on which they were found.
+        more: the larger one.
+    """
+    close, rest = _close(minima)
+    if len(close) > 1:
+        settled = [_redescend(problem, m.state, data, _PATIENT) for m in close]
+        close, beaten = _close(_valid(settled, data))
+        rest = [*beaten, *rest]
+    finished = [_redescend(problem, _on(m.state, more), more, _PATIENT) for m in close[:FINALISTS]]
+    return [*_valid(finished, more), *close[FINALISTS:], *rest]
+
+
+def _close(minima: list[Minimum]) -> tuple[list[Minimum], list[Minimum]]:
+    """Split minima, best first, into those whose cost is similar to the best one's and the rest."""
+    limit = SIMILAR_COST * min((m.cost for m in minima), default=0.0)
+    return [m for m in minima if m.cost <= limit], [m for m in minima if m.cost > limit]
 
 
 def _graduated(
@@ -174,7 +196,7 @@ def ranked(minima: list[Minimum]) -> list[Minimum]:
     tied = {
         id(m)
         for m in kept
-        if m.cost <= best.cost + cost_margin(best.state.r, m.state.r, loss) / scale**2
+        if m.cost <= best.cost + cost_margin(best.state.r, m.state.r, loss, 1.0) / scale**2
     }
     return sorted(
         kept,
@@ -183,34 +205,39 @@ def ranked(minima: list[Minimum]) -> list[Minimum]:
     )  # fmt: skip
 
 
-def cost_margin(a: Vectors, b: Vectors, loss: Loss) -> float:
+def cost_margin(a: Vectors, b: Vectors, loss: Loss, errors: float = 3.0) -> float:
     """Return the difference of mean loss that noise alone makes between two calibrations.
 
     Each feels the noise across its own epipolar lines, so even two exact poses differ by the
-    standard error of the pointwise differences; three of them count (Vuong 1989). Calibrations
-    in one valley feel the same noise: there a chi-square difference of 9 counts.
+    standard error of the pointwise differences (Vuong 1989). Calibrations in one valley feel the
+    same noise: there a chi-square difference of 9 counts.
 
     Args:
         a: (N,) residuals of one calibration, pattern pixels.
         b: (N,) of the other, at the same correspondences.
+        errors: standard errors that count.
     """
     difference = loss.values(b) - loss.values(a)
     sigma2 = (loss.scale / REDESCENDING) ** 2
-    return max(3 * float(difference.std()) / np.sqrt(len(a)), 4.5 * sigma2 / len(a))
+    return max(errors * float(difference.std()) / np.sqrt(len(a)), 4.5 * sigma2 / len(a))
 
 
-def _descend(problem: Problem, state: State, data: Correspondences, loss: Loss) -> State:
+def _descend(
+    problem: Problem, state: State, data: Correspondences, loss: Loss, iterations: int = 20
+) -> State:
     return minimise(
-        state, data, loss,
-        refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds,
+        state, data, loss, refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds,
+        iterations=iterations,
     )  # fmt: skip
 
 
-def _redescend(problem: Problem, state: State, data: Correspondences) -> State:
+def _redescend(
+    problem: Problem, state: State, data: Correspondences, iterations: int = 20
+) -> State:
     """Alternate the residual scale and the minimum under it until the scale stays."""
     for _ in range(4):
         scale = robust_scale(state)
-        state = _descend(problem, state, data, Loss(True, REDESCENDING * scale))
+        state = _descend(problem, state, data, Loss(True, REDESCENDING * scale), iterations)
         if abs(robust_scale(state) - scale) < 0.02 * scale:
             break
     return state

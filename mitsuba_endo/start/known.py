@@ -7,15 +7,11 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 
-from .choose import robust_scale
 from .clean import clean_map
 from .correspondences import checked_map, gather
+from .depth_image import depth_image
 from .refine import evaluate
 from .result import Start
-from .triangulate import ranges
-
-_KEEP = 5.0
-"""Correspondences within this many residual scales of their epipolar curve are used."""
 
 
 def known_start(
@@ -40,11 +36,5 @@ def known_start(
     q = checked_map(q, camera)
     pose = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
     data = gather(q, clean_map(q) if usable is None else usable, camera)
-    state = evaluate(pose, projector, data)
-    scale = robust_scale(state)
-    at_camera, at_projector, _ = ranges(pose, state.seen, state.at)
-    keep = (np.abs(state.r) <= _KEEP * scale) & (at_camera > 0) & (at_projector > 0)
-    keep &= np.isfinite(at_camera)
-    depth = np.full(q.shape[:2], np.nan)
-    depth.flat[data.pixel[keep]] = at_camera[keep]
-    return Start(projector, pose, depth, np.isfinite(depth), scale)
+    seen = depth_image(evaluate(pose, projector, data), data, (camera.height, camera.width))
+    return Start(projector, pose, seen.depth, seen.used, seen.scale_px)

@@ -12,14 +12,12 @@ from mitsuba_endo.geometry.laws import ProjectorModel
 from .choose import Minimum, Problem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
 from .correspondences import Correspondences, checked_map, gather, spread_sample
+from .depth_image import depth_image
 from .notes import remarks
 from .propose import distinct, ladder, propose
 from .refine import evaluate
 from .result import Start
-from .triangulate import ranges
 
-KEEP = 5.0
-"""Correspondences within this many residual scales of their epipolar curve count as used."""
 PROPOSE_POINTS, REFINE_POINTS, FINISH_POINTS = 500, 1500, 40_000
 CANDIDATES = 8
 MAX_SCALE = 0.02
@@ -80,16 +78,18 @@ def search_start(
     problem = Problem(projector, refine_focal, bounds, noise_scale(q, usable))
     minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
     say("finish")
-    minima = finish(problem, minima, many) if minima else []
+    minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)
     say("triangulate")
-    used, depth = _triangulated(minima[0], data, camera)
+    found = minima[0].state
+    shape = (camera.height, camera.width)
+    seen = depth_image(evaluate(found.pose, found.projector, data), data, shape)
     return Start(
-        projector=minima[0].state.projector,
-        projector_from_camera=minima[0].state.pose,
-        depth=depth,
-        used=used,
-        scale_px=robust_scale(minima[0].state),
+        projector=found.projector,
+        projector_from_camera=found.pose,
+        depth=seen.depth,
+        used=seen.used,
+        scale_px=robust_scale(found),
         notes=remarks(minima, many, refine_focal),
         alternatives=[m.candidate for m in minima[1:]],
     )
@@ -117,22 +117,6 @@ def _check_extent(data: Correspondences) -> None:
             f"the correspondences span only {np.round(high - low, 3).tolist()} pattern pixels",
             todo="give q in pattern pixels, not normalised to 0..1",
         )
-
-
-def _triangulated(
-    minimum: Minimum, data: Correspondences, camera: CameraModel
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Return the used pixels (H, W) and their depth (H, W), baselines along the unit ray."""
-    state = evaluate(minimum.state.pose, minimum.state.projector, data)
-    at_camera, at_projector, _ = ranges(state.pose, state.seen, state.at)
-    near = np.abs(state.r) <= KEEP * robust_scale(state)
-    keep = near & (at_camera > 0) & (at_projector > 0) & np.isfinite(at_camera)
-    used = np.zeros(camera.height * camera.width, bool)
-    depth = np.full(used.shape, np.nan)
-    used[data.pixel[keep]] = True
-    depth[data.pixel[keep]] = at_camera[keep]
-    shape = (camera.height, camera.width)
-    return used.reshape(shape), depth.reshape(shape)
 
 
 def _check_focal(projector: ProjectorModel, refine_focal: bool, guess: float | None) -> None:
