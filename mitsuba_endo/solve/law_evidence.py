@@ -32,32 +32,46 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     common = sorted(set.intersection(*(set(c) for c in costs)))
     totals = [sum(c[key] for key in common) + _prior(f, sigma)
               for c, f in zip(costs, fits, strict=True)]  # fmt: skip
-    order = sorted(range(len(fits)), key=lambda i: (not _settled(fits[i]), totals[i]))
+    order = sorted(range(len(fits)), key=lambda i: totals[i])
     best, other = order[0], order[1]
     difference = np.array([costs[other][key] - costs[best][key] for key in common])
     total = float(totals[other] - totals[best])
     error = float(difference.std(ddof=1) * np.sqrt(len(difference))) if len(common) > 1 else np.inf
     significance = total / error if error > 0 else 0.0
-    clear = total > MIN_EVIDENCE and significance > MIN_SIGNIFICANCE
+    open_ = _may_gain(fits[other])
+    decided = total - open_ > max(MIN_EVIDENCE, MIN_SIGNIFICANCE * error)
     name, rival = fits[best].law, fits[other].law
+    how = f"{total:.{0 if decided else 1}f}, {significance:.1f} standard errors"
     text = (
-        f"the residuals support {name} over {rival}: log-likelihood higher by {total:.0f}, "
-        f"{significance:.1f} standard errors"
-        if clear
-        else f"the residuals cannot tell {name} from {rival}: log-likelihood differs by "
-        f"{total:.1f}, {significance:.1f} standard errors"
+        f"the residuals support {name} over {rival}: log-likelihood higher by {how}"
+        if decided
+        else f"the residuals cannot tell {name} from {rival}: log-likelihood differs by {how}"
     )
+    if open_ > 0:
+        text += f"; the fit of {rival} had not converged and may gain about {open_:.0f}"
+    if not decided and _settled(fits[other]) and not _settled(fits[best]):
+        best = other  # the data allow both, and this one is finished
     evidence = {
-        "chosen": name,
+        "chosen": fits[best].law,
         "conclusion": text,
-        "decided": clear,
+        "decided": decided,
         "log_likelihood_difference": total,
         "standard_errors": significance,
         "noise_px": {f.law: f.uncertainty.sigma for f in fits},
         "focal": {f.law: float(np.exp(f.optimum.state.intrinsics[0][0])) for f in fits},
     }
-    warning = [] if clear else [f"{text}; give projector.law if it is known"]
+    warning = [] if decided else [f"{text}; give projector.law if it is known"]
     return fits[best], evidence, warning
+
+
+def _may_gain(fit: Fit) -> float:
+    """Return the log-likelihood that a fit which has not converged may still gain, about.
+
+    That of the step it would make next, times ten: along a valley many more follow.
+    """
+    if _settled(fit) or not fit.optimum.trace:
+        return 0.0
+    return 5.0 * fit.problem.plan.columns * fit.optimum.trace[-1].step ** 2
 
 
 def _settled(fit: Fit) -> bool:
