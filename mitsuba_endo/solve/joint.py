@@ -45,6 +45,8 @@ class FrameStart:
     """(N,) squared residuals, NaN where missed."""
     used: NDArray[np.bool_]
     """(N,) correspondences that the robust loss kept."""
+    information: NDArray[np.float64]
+    """(G, G) about its own global unknowns, noise variances taken out."""
     range: NDArray[np.float64] | None
     """(H, W) range image of the surface as it is reported, if frames are registered by it."""
     notes: list[str]
@@ -70,6 +72,7 @@ def frame_start(
         intrinsics=state.intrinsics[0],
         squared=optimum.evaluation.squared(0),
         used=optimum.weights[0] > USED_WEIGHT,
+        information=optimum.normal_equations().reduce().S / optimum.objective.sigma**2,
         range=render_frames(smooth_surfaces(optimum, options), camera)[0].range
         if registered
         else None,

@@ -1,9 +1,18 @@
-"""The limits of agreement. Oracle: the table below; whole solves are in ``test_bad_frames``."""
+"""The limits of agreement. Oracle: tables and formulas; whole solves are in ``test_bad_frames``."""
+
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.agreement import Agreement, worst
+from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector, tangent_basis
+from mitsuba_endo.records.rig import Sharing
+from mitsuba_endo.solve.agreement import Agreement, chance, worst
+from mitsuba_endo.solve.joint import FrameStart
+from mitsuba_endo.solve.optimum import Optimum
+from mitsuba_endo.solve.plan import Plan
+from mitsuba_endo.solve.state import State
 
 RIGHT = Agreement("right", 0.9, 1.03, 0.01)
 FOLDS = Agreement("folds", 1.0, 1.2, 0.2)
@@ -32,3 +41,57 @@ def test_strays_go_first_then_the_worst() -> None:
     """A stray hardly disturbs and is certain; the larger misfit is the stranger."""
     assert worst([OTHER, STRAY, WORSE]) == 1
     assert worst([OTHER, RIGHT, WORSE]) == 2
+
+
+SHARES: dict[str, Sharing] = {"camera_pose": "per_frame", "projector_pose": "per_frame", "focal": "shared",
+          "centre": "fixed", "aspect": "fixed", "distortion": "fixed"}  # fmt: skip
+TURN, MOVE, FOCAL = 1e-4, 5e-4, 2e-4
+"""Standard deviations of the frame alone: radians, baselines, relative."""
+POSE = RigidTransform.of([0.03, -0.1, 0.05], [-0.9, 0.1, 0.42])
+
+
+def moved(step: list[float], focal: float = 0.0, **deviations: float) -> float:
+    """Chance of a joint solution that is some standard deviations from the frame alone."""
+    own = RigidTransform(POSE.R, POSE.t / np.linalg.norm(POSE.t))
+    sizes = {"turn": TURN, "move": MOVE, **deviations}
+    std = np.array([sizes["turn"]] * 3 + [sizes["move"]] * 2 + [FOCAL])
+    alone = SimpleNamespace(
+        projector_from_camera=own, intrinsics=np.zeros(9), information=np.diag(std**-2.0)
+    )
+    t = own.t + tangent_basis(own.t) @ np.array(step[3:]) * MOVE
+    joint = RigidTransform(rotation_from_vector(np.array(step[:3]) * TURN) @ own.R, 1.07 * t)
+    vector = np.zeros(9)
+    vector[0] = focal * FOCAL
+    plan = Plan(2, "shared", dict(SHARES))
+    at = SimpleNamespace(
+        objective=SimpleNamespace(problem=SimpleNamespace(plan=plan)),
+        state=State([], [], [own, joint], [np.zeros(9), vector]),
+    )
+    return chance(cast(FrameStart, alone), cast(Optimum, at), 1)
+
+
+def test_chance_of_a_difference() -> None:
+    """Oracle: the chi-square distribution of six unknowns, from its closed form for six degrees."""
+
+    def six(x: float) -> float:
+        return float(np.exp(-x / 2) * (1 + x / 2 + (x / 2) ** 2 / 2))
+
+    assert moved([0, 0, 0, 0, 0]) == pytest.approx(1)
+    assert moved([1, 0, 0, 0, 0]) == pytest.approx(six(1), rel=1e-3)
+    assert moved([0, -2, 1, 3, 0], focal=-1) == pytest.approx(six(15), rel=1e-2)
+    assert moved([0, 0, 0, 0, 0], focal=6) == pytest.approx(six(36), rel=1e-3)
+
+
+def test_unknowns_that_a_frame_hardly_knows_are_not_compared() -> None:
+    """Oracle: five deviations along directions whose deviation is one percent do not count."""
+    assert moved([0, 0, 0, 100, 0], move=0.01) > 0.9
+    assert moved([8, 0, 0, 100, 0], move=0.01) < 1e-9
+
+
+def test_contradiction_is_a_doubt_and_says_so() -> None:
+    found = Agreement("frame", 0.5, 1.01, 0.0, chance=1e-6)
+    assert found.doubtful
+    assert not found.wrong
+    assert "alone it gives another projector pose" in found.reason
+    assert "1e-06" in found.reason
+    assert not Agreement("frame", 0.5, 1.01, 0.0, chance=0.02).doubtful
