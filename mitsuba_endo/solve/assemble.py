@@ -47,6 +47,9 @@ from .state import INTRINSICS
 from .surface_result import USED_WEIGHT, Rendering, frame_maps, render_frames, surface_estimate
 from .verdict import verdict
 
+UNSETTLED = "the optimisation had not converged"
+"""Why a value with a small standard deviation is weak."""
+
 
 @dataclass(frozen=True, eq=False)
 class Report:
@@ -66,6 +69,10 @@ class Report:
     def plan(self) -> Plan:
         return self.fit.problem.plan
 
+    def status(self, slot: slice) -> Status:
+        """Return the status of a block."""
+        return _status(self.fit.optimum.outcome, self.covariance, self.names[slot], slot)
+
     def ambiguous(self, frame: int) -> bool:
         """Tell whether the residuals cannot choose between this frame's pose and another."""
         return any(frame in frames and not rival.decided for frames, rival in self.rivals)
@@ -75,6 +82,8 @@ class Report:
         slot = self.plan.slot(block, frame)
         if slot is None:
             return None
+        if _worst(self.covariance, self.names[slot], slot) == "measured":
+            return UNSETTLED
         mine = {self.names[i].words(self.plan) for i in range(slot.start, slot.stop)}
         for direction in self.directions:
             if mine & set(direction.mixes):
@@ -153,8 +162,11 @@ def _report(fit: Fit, unit: Unit) -> Report:
     rho = fit.state.rho[0]
     points = fit.problem.surfaces[0].lattice.vertices(rho)
     determined = [
-        _worst(covariance, names, fit.problem.plan.slot("projector_pose", k)) != "unobservable"
-        and _worst(covariance, names, fit.problem.plan.slot("focal", k)) != "unobservable"
+        all(
+            slot is None
+            or _status(fit.optimum.outcome, covariance, names[slot], slot) != "unobservable"
+            for slot in (fit.problem.plan.slot(b, k) for b in ("projector_pose", "focal"))
+        )
         for k in range(len(fit.maps))
     ]
     return Report(
@@ -224,7 +236,7 @@ def _intrinsic(report: Report, block: str, frame: int) -> Estimate:
         return Estimate(value=_plain(values, block), status="fixed")
     scale = values if block in ("focal", "aspect") else np.ones(len(values))
     formal, jackknife, largest = _deviations(report, slot, scale)
-    worst = _worst(report.covariance, report.names, slot)
+    worst = report.status(slot)
     return Estimate(
         value=None if worst == "unobservable" else _plain(values, block),
         std=_plain(largest, block),
@@ -260,12 +272,25 @@ def _deviations(
     return formal, jackknife, np.sqrt(np.diag(report.covariance)[slot]) * scale
 
 
-def _worst(covariance: NDArray[np.float64], names: list[Unknown], slot: slice | None) -> Status:
-    """Return the status of a block, that of its least known unknown."""
-    if slot is None:
-        return "fixed"
+def _status(
+    outcome: Outcome, covariance: NDArray[np.float64], names: list[Unknown], slot: slice
+) -> Status:
+    """Return the status of a block with the unknowns ``names`` at ``slot``.
+
+    Nothing is measured before the optimisation has settled; and what is weak then may be on its
+    way along a valley that has no end.
+    """
+    worst = _worst(covariance, names, slot)
+    if outcome is Outcome.CONVERGED or worst == "unobservable":
+        return worst
+    ended = outcome in (Outcome.STALLED, Outcome.MAX_ITERATIONS)
+    return "unobservable" if worst == "weak" and ended else "weak"
+
+
+def _worst(covariance: NDArray[np.float64], names: list[Unknown], slot: slice) -> Status:
+    """Return the status that the least known unknown of a block has by its deviation."""
     deviations = np.sqrt(np.diag(covariance))[slot]
-    return status_of(max(float(d) / n.scale for d, n in zip(deviations, names[slot], strict=True)))
+    return status_of(max(float(d) / n.scale for d, n in zip(deviations, names, strict=True)))
 
 
 def _frame(report: Report, k: int, slips: int | None) -> Frame:
@@ -294,7 +319,7 @@ def _pose(report: Report, block: str, frame: int, pose: RigidTransform) -> PoseE
     slot = report.plan.slot(block, frame)
     if slot is None:
         return PoseEstimate.of(pose, std=[0.0] * 6, status="fixed")
-    status = _worst(report.covariance, report.names, slot)
+    status = report.status(slot)
     reason = None if status == "measured" else report.reason(block, frame)
     if status == "unobservable":
         return PoseEstimate(R=None, t=None, status=status, reason=reason)
@@ -343,7 +368,13 @@ def _warnings(report: Report) -> list[str]:
     fit = report.fit
     out = [report.unit.warning] if report.unit.warning else []
     if fit.optimum.outcome in (Outcome.MAX_ITERATIONS, Outcome.STALLED):
-        out.append("the optimisation had not converged; do not trust the values")
+        free = report.directions[:1] if fit.optimum.outcome is Outcome.STALLED else []
+        out.append(
+            f"the optimisation stopped along a direction that the data hardly determine "
+            f"({_listed(free[0].mixes)})"
+            if free
+            else "the optimisation had not converged; do not trust the values"
+        )
     out += [f"frame {f.name} was left out: {f.reason}" for f in fit.left_out]
     plan = report.plan
     if plan.frames > 1 and plan.surface == plan.blocks["projector_pose"] == "per_frame":

@@ -4,11 +4,11 @@ A forecast, made where surface and poses are only roughly right; the verdict at 
 counts neither prior nor noise as information and replaces it.
 """
 
+from .information import inverse_information
 from .objective import Objective, estimate_noise, evaluate
 from .observability import Direction, free_directions, unknowns
 from .problem import Problem
 from .state import State
-from .uncertainty import inverse_information
 
 
 def foreseen_directions(problem: Problem, state: State, finish: str) -> list[Direction]:

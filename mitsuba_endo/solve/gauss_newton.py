@@ -1,7 +1,7 @@
 """Levenberg-Marquardt on the rendered projector coordinates."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +25,14 @@ _CREEP, _LEAST_GAIN, _PATIENCE = 2.0, 0.05, 2
 less log-likelihood than ``_LEAST_GAIN`` per global unknown, as a step of 0.3 standard deviations
 does on a smooth cost. A surface of triangles gives a moving camera a cost with kinks, over which
 small steps never end."""
+_FLAT = (0.3, 8)
+"""Stalled after so many steps, however long, that gain so little each: along a direction that the
+data do not determine the cost hardly falls, and noise alone decides where it is least."""
+_FAR = 3.0
+"""Undamped over damped step from which on the damping, not the optimum, keeps steps short: a valley
+along which the unknowns are hardly known."""
+_HARMLESS = 1e-8
+"""Damping that does not shorten steps along any valley of interest."""
 _TRIES = 8
 """Steps tried in one iteration before it counts as stalled."""
 
@@ -56,7 +64,8 @@ class GaussNewton:
     def init(self, state: State) -> None:
         """Evaluate the starting state."""
         self._began = time.perf_counter()
-        self._mu, self._useless = _FIRST_DAMPING, 0
+        self._mu = _FIRST_DAMPING
+        self._gains: list[float] = []
         self._now = evaluate(self.objective.problem, state)
         self.objective.sigma = estimate_noise(self._now)
 
@@ -70,18 +79,19 @@ class GaussNewton:
         self._record(size)
         # The first stage only leads to the last one, whose optimum is another.
         settled = size < self.tolerance * (_LOOSE if self.objective.stage == 0 else 1.0)
-        settled |= self._creeps(size, gain)
-        if not accepted and not settled:
+        self._gains.append(gain)
+        settled |= size < _CREEP and self._gained_less(_LEAST_GAIN, _PATIENCE)
+        flat = size >= _CREEP and self._gained_less(*_FLAT)
+        if not settled and (flat or not accepted):
             return self._leave_stage(Outcome.STALLED)
         steady = self.objective.follow(self._now)
         return self._leave_stage(Outcome.CONVERGED) if settled and steady else None
 
-    def _creeps(self, size: float, gain: float) -> bool:
-        """Tell whether the last steps were small and useless."""
+    def _gained_less(self, gain: float, steps: int) -> bool:
+        """Tell whether each of the last steps gained less log-likelihood per global unknown."""
         unknowns = max(self.objective.problem.plan.columns, 1)
-        useless = size < _CREEP and gain < _LEAST_GAIN * unknowns
-        self._useless = self._useless + 1 if useless else 0
-        return self._useless >= _PATIENCE
+        last = self._gains[-steps:]
+        return len(last) == steps and max(last) < gain * unknowns
 
     def _leave_stage(self, outcome: Outcome) -> Outcome | None:
         return None if self.objective.next_stage(self._now) else outcome
@@ -97,8 +107,15 @@ class GaussNewton:
             except np.linalg.LinAlgError:
                 self._raise_damping()
                 continue
-            size = self._size(normal, surfaces, step)
+            size = self._size(normal.schur, step, surfaces, normal)
+            valley = False
+            if size < _CREEP and self._mu > _HARMLESS:
+                whole, S = normal.undamped()
+                short, size = size, max(size, self._size(S, whole))
+                valley = size > max(1.0, _FAR * short)
             trial = evaluate(problem, apply_step(problem.plan, self._now.state, surfaces, step))
+            if valley and self.objective.cost(trial) > cost:
+                trial = self._resettled(trial)
             if self.objective.cost(trial) <= cost:
                 self._now = trial
                 if attempt == 0:  # a damping that was only just enough is needed again
@@ -106,17 +123,31 @@ class GaussNewton:
                 return True, size
             if size < self.tolerance:
                 return False, size  # at the bottom, where rounding decides
-            self._raise_damping()
+            self._raise_damping(0.0 if valley else _DAMPING_RANGE[1])
         return False, size
 
-    def _raise_damping(self) -> None:
-        self._mu = max(self._mu * 10, _DAMPING_RANGE[1])
+    def _resettled(self, at: Evaluation) -> Evaluation:
+        """Return a trial whose surfaces have followed its global unknowns once more.
+
+        Far along a valley their first-order answer falls short.
+        """
+        problem = self.objective.problem
+        for _ in range(2):
+            normal = self.objective.normal_equations(at)
+            surfaces = [-b.damped(0.0).solve(b.g[:, None])[:, 0] for b in normal.surfaces]
+            still = np.zeros(problem.plan.columns)
+            at = evaluate(problem, apply_step(problem.plan, at.state, surfaces, still))
+        return at
+
+    def _raise_damping(self, least: float = _DAMPING_RANGE[1]) -> None:
+        self._mu = max(self._mu * 10, least)
 
     def _size(
         self,
-        normal: NormalEquations,
-        surfaces: list[NDArray[np.float64]],
+        S: NDArray[np.float64],
         step: NDArray[np.float64],
+        surfaces: Sequence[NDArray[np.float64]] = (),
+        normal: NormalEquations | None = None,
     ) -> float:
         """Return a step's size in standard deviations of the unknowns.
 
@@ -125,8 +156,8 @@ class GaussNewton:
         """
         parts = [0.0]
         if len(step):
-            parts.append(float(np.sqrt(max(step @ normal.schur @ step, 0.0) / len(step))))
-        for x, block in zip(surfaces, normal.surfaces, strict=True):
+            parts.append(float(np.sqrt(max(step @ S @ step, 0.0) / len(step))))
+        for x, block in zip(surfaces, normal.surfaces if normal else (), strict=True):
             parts.append(float(np.median(np.abs(x) * np.sqrt(block.A.diagonal()))))
         return max(parts) / self.objective.sigma
 

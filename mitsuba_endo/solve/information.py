@@ -6,6 +6,8 @@ projector with a free centre). And the surface found is bumpy with noise: a plan
 show the focal length of a pinhole projector, seems to have the relief that would.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
@@ -26,35 +28,77 @@ _TRUSTED = 0.5
 """Share of the apparent information that must remain; else the noise outweighs the data."""
 _NOTHING = 1e-4
 """Share that is left to a direction without information, so that numbers stay finite."""
+_MOST_EXCESS = 100.0
+"""Largest ratio of a score's variance to the information, likewise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What the data tell about the global unknowns, in noise variances."""
+
+    known: NDArray[np.float64]
+    """(G, G) information I of the data."""
+    score: NDArray[np.float64]
+    """(G, G) variance V of the score of the calibration. Noise on its surface that passes for
+    relief multiplies noise of the residuals: V is I and what that adds."""
+
+    def covariance(self) -> NDArray[np.float64]:
+        """Return I^-1 V I^-1 (G, G), V taken to be at least I and finite.
+
+        The covariance of an estimator that solves a score equation (Huber 1967).
+        """
+        inverse = inverse_information(self.known)
+        if self.score is self.known or not len(inverse):
+            return inverse
+        scale = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+        values, vectors = np.linalg.eigh(inverse / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        excess, turn = np.linalg.eigh(root.T @ self.score @ root)
+        turned = root @ turn
+        return (turned * np.clip(excess, 1.0, _MOST_EXCESS)) @ turned.T
+
+
+def inverse_information(S: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Invert after scaling; directions without information get a huge variance, not infinity."""
+    if not len(S):
+        return S
+    scale = 1 / np.sqrt(np.maximum(np.diag(S), 1e-300))
+    values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
+    values = np.maximum(values, 1e-14 * values[-1])
+    return np.outer(scale, scale) * ((vectors / values) @ vectors.T)
 
 
 def data_information(
-    optimum: Optimum, normal: NormalEquations, reduced: Reduced, variance: float
-) -> NDArray[np.float64]:
-    """Return the information (G, G) about the global unknowns, in noise variances.
+    optimum: Optimum, smooth: Optimum, normal: NormalEquations, reduced: Reduced, variance: float
+) -> Information:
+    """Return the information about the global unknowns, in noise variances.
 
     The surface is free: its prior counts for next to nothing. Where some direction is not known
     well, noise is added once more to the surface by simulation, and what that adds to the
     information is subtracted (simulation extrapolation, Cook and Stefanski 1994).
 
     Args:
-        optimum: where.
-        normal: its normal equations.
+        optimum: the calibration.
+        smooth: the same with its surface smoothed, where the information is taken.
+        normal: the normal equations of ``smooth``.
         reduced: the same, reduced.
         variance: of one coordinate, pattern pixels squared.
     """
-    S = _information(optimum, optimum.state, normal)
-    names = unknowns(optimum.objective.problem.plan, optimum.state)
+    S = _information(smooth, smooth.state, normal)
+    names = unknowns(smooth.objective.problem.plan, smooth.state)
     scale = np.array([u.scale for u in names])
     weakest = scipy.linalg.eigvalsh(S * np.outer(scale, scale))[:1]
     if not len(S) or weakest[0] * _DOUBTFUL**2 > variance:
-        return S
+        return Information(S, S)
     rng = np.random.default_rng(0)
     noisy = []
     for _ in range(_DRAWS):
-        state = _with_more_noise(optimum, reduced, np.sqrt(variance), rng)
-        noisy.append(_information(optimum, state, _data_terms(optimum, state)))
-    return without_false_information(S, np.mean(noisy, axis=0))
+        state = _with_more_noise(smooth, reduced, np.sqrt(variance), rng)
+        noisy.append(_information(smooth, state, _data_terms(smooth, state)))
+    return Information(
+        without_false_information(S, np.mean(noisy, axis=0)),
+        _information(optimum, optimum.state, optimum.normal_equations()),
+    )
 
 
 def without_false_information(

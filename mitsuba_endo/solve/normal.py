@@ -117,6 +117,11 @@ class NormalEquations:
         ]
         return surfaces, step
 
+    def undamped(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the step (G,) of the global unknowns without damping, and the Schur complement."""
+        reduced = self.reduce()
+        return -_solve_symmetric(reduced.S, reduced.g), reduced.S
+
     def reduce(self, mu: float = 0.0) -> "Reduced":
         """Eliminate the surfaces."""
         S, g = self.D.copy(), self.g.copy()

@@ -47,7 +47,8 @@ class Uncertainty:
     """(V, K) what the inverse ranges of every surface have in common: rows whose products are the
     covariances that come from the global unknowns."""
     information: NDArray[np.float64]
-    """(G, G) information of the data over the noise variance; inverse of ``formal``."""
+    """(G, G) information of the data over the noise variance. Its inverse is a bound of
+    ``formal``, which is reached where the relief outweighs the noise on the surface."""
 
 
 def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncertainty:
@@ -66,8 +67,8 @@ def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncerta
     blocks, frames = _jackknives(optimum, normal, reduced) if jackknife else (None, None)
     normal = reported.normal_equations()  # one of the two at a time: they are large
     reduced = normal.reduce()
-    information = data_information(reported, normal, reduced, variance)
-    S_inverse = inverse_information(information)
+    information = data_information(optimum, reported, normal, reduced, variance)
+    S_inverse = information.covariance()
     scale = shrinkage * variance
     errors = [
         _surface_errors(factor, block.B, S_inverse)
@@ -80,7 +81,7 @@ def uncertainty(optimum: Optimum, reported: Optimum, jackknife: bool) -> Uncerta
         frame_jackknife=frames,
         rho_std=[np.sqrt(scale * of_vertices) for of_vertices, _ in errors],
         rho_modes=[np.sqrt(scale) * modes for _, modes in errors],
-        information=information / scale,
+        information=information.known / scale,
     )
 
 
@@ -158,22 +159,14 @@ def shared_modes(moved: NDArray[np.float64]) -> NDArray[np.float64]:
     return moved @ strongest[:, ::-1][:, :MODES]
 
 
-def inverse_information(S: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Invert after scaling; directions without information get a huge variance, not infinity."""
-    if not len(S):
-        return S
-    scale = 1 / np.sqrt(np.maximum(np.diag(S), 1e-300))
-    values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
-    values = np.maximum(values, 1e-14 * values[-1])
-    return np.outer(scale, scale) * ((vectors / values) @ vectors.T)
-
-
 def _block_contributions(
     optimum: Optimum, frame: int, X: NDArray[np.float64]
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Yield the parts (G, G) of S and (G,) of the reduced gradient of a frame's image blocks.
 
-    S = sum_b (D_b - B_b^T X) with X = A^-1 B: exact, because D and B are sums over pixels.
+    With the surface following the global unknowns, X = A^-1 B, the rows of a pixel are K = J_global
+    - J_surface X; S is the sum of K^T K and of what the prior resists. Every part is positive, so
+    that leaving one out never invents information about what other frames see of the block.
 
     Args:
         optimum: where.
@@ -198,8 +191,10 @@ def _block_contributions(
         L, Z, w = local[rows], surface[rows], weighted[rows]
         coupling = (Z.T @ L).T
         seen = np.flatnonzero(coupling.any(0))
-        H = chart.T @ ((L.T @ L) @ chart - coupling[:, seen] @ X[seen])
-        yield (H + H.T) / 2, chart.T @ (L.T @ w) - X[seen].T @ (Z.T @ w)[seen]
+        Z, near = Z[:, seen], X[seen]
+        cross = chart.T @ coupling[:, seen] @ near
+        H = chart.T @ (L.T @ L) @ chart - cross - cross.T + near.T @ (Z.T @ Z @ near)
+        yield H, chart.T @ (L.T @ w) - near.T @ (Z.T @ w)
 
 
 def image_blocks(pixels: NDArray[np.integer], shape: tuple[int, int]) -> NDArray[np.int64]:
