@@ -43,8 +43,14 @@ def test_strays_go_first_then_the_worst() -> None:
     assert worst([OTHER, RIGHT, WORSE]) == 2
 
 
-SHARES: dict[str, Sharing] = {"camera_pose": "per_frame", "projector_pose": "per_frame", "focal": "shared",
-          "centre": "fixed", "aspect": "fixed", "distortion": "fixed"}  # fmt: skip
+SHARES: dict[str, Sharing] = {
+    "camera_pose": "per_frame",
+    "projector_pose": "per_frame",
+    "focal": "shared",
+    "centre": "fixed",
+    "aspect": "fixed",
+    "distortion": "fixed",
+}
 TURN, MOVE, FOCAL = 1e-4, 5e-4, 2e-4
 """Standard deviations of the frame alone: radians, baselines, relative."""
 POSE = RigidTransform.of([0.03, -0.1, 0.05], [-0.9, 0.1, 0.42])
