@@ -15,6 +15,7 @@ from ..rendering.rays import pixel_rays
 from ..rendering.untyped import dr, mi
 from ..shapes.mesh import Mesh
 from .checks import check_view
+from .creases import with_creases
 from .materials import (
     entering_part,
     index_of_refraction,
@@ -190,11 +191,12 @@ def _surface(mesh: Mesh, bsdf: dict[str, Any], medium: dict[str, Any] | None) ->
     props["material"] = mi.load_dict(bsdf)
     if medium is not None:
         props["interior"] = mi.load_dict(medium)
+    vertices, faces = with_creases(mesh)
     surface: Any = mi.Mesh(
-        keys.SURFACE, len(mesh.vertices), len(mesh.faces), props=props, has_vertex_normals=True
+        keys.SURFACE, len(vertices), len(faces), props=props, has_vertex_normals=True
     )
     parameters = mi.traverse(surface)
-    parameters[keys.FACES] = mesh.faces.astype(np.uint32).ravel()
-    parameters[keys.VERTEX_POSITIONS] = mesh.vertices.astype(np.float32).ravel()
+    parameters[keys.FACES] = faces.astype(np.uint32).ravel()
+    parameters[keys.VERTEX_POSITIONS] = vertices.astype(np.float32).ravel()
     parameters.update()
     return surface
