@@ -9,7 +9,7 @@ import numpy as np
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, SurfaceEstimate
 from . import surface_colours
-from .figures import unit_name
+from .numbers import unit_name
 from .places import REACH, Floats, Place, Rays, correspondence_rays, places
 from .surface_colours import Shown
 from .truth import Truth, load_truth, surface_error

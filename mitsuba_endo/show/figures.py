@@ -14,6 +14,7 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, FrameMaps, TraceRow
 from ..records.solution import Solution
 from . import panels
+from .numbers import headline, unit_name
 from .places import places
 from .view import SurfaceView
 
@@ -160,42 +161,6 @@ def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     panels.residual_histogram(axes[1, 2], frames, solution.noise_px, scale)
     figure.suptitle(headline(solution))
     return figure
-
-
-def headline(solution: Solution) -> str:
-    """Return outcome, focal length, first baseline and residual in one line."""
-    parts = [solution.outcome.replace("_", " ")]
-    focal = solution.frames[0].focal or solution.projector.focal
-    parts.append(f"focal length {_quantity(focal.value, focal.std, focal.status, 'pattern px')}")
-    pose = solution.frames[0].projector_from_camera.to_transform()
-    if pose is None:
-        parts.append("projector pose unknown")
-    elif solution.units == "mm":
-        given = " (given)" if solution.scale == "baseline" else ""
-        parts.append(f"baseline {np.linalg.norm(pose.t):.5g} mm{given}")
-    else:
-        parts.append("up to scale")
-    rms = [f.rms_px for f in solution.frames if f.rms_px is not None]
-    if rms:
-        parts.append(f"residual {math.sqrt(np.mean(np.square(rms))):.3g} px RMS")
-    return "; ".join(parts)
-
-
-def unit_name(solution: Solution) -> str:
-    """Return the unit of length as a label."""
-    return "mm" if solution.units == "mm" else "baselines"
-
-
-def _quantity(value: Any, std: Any, status: str, unit: str) -> str:
-    if value is None:
-        return f"unknown ({status})"
-    if status == "fixed":
-        return f"{value:.6g} {unit} (given)"
-    digits = f"{value:.6g}"
-    if isinstance(std, float | int) and std > 0:
-        places = max(0, 1 - math.floor(math.log10(std)))  # two significant digits of the std
-        digits = f"{value:.{places}f} ± {std:.{places}f}"
-    return f"{digits} {unit}" + ("" if status == "measured" else f" ({status})")
 
 
 def projector_poses(solution: Solution) -> list[RigidTransform]:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -106,3 +107,38 @@ def interval(value: float | None, std: float | None) -> tuple[str, str]:
     half = INTERVAL * std
     places = max(0, 1 - math.floor(math.log10(half)))
     return f"{value:.{places}f}", f"± {half:.{places}f}"
+
+
+def headline(solution: Solution) -> str:
+    """Return outcome, focal length, first baseline and residual in one line."""
+    parts = [solution.outcome.replace("_", " ")]
+    focal = solution.frames[0].focal or solution.projector.focal
+    parts.append(f"focal length {_quantity(focal.value, focal.std, focal.status, 'pattern px')}")
+    pose = solution.frames[0].projector_from_camera.to_transform()
+    if pose is None:
+        parts.append("projector pose unknown")
+    elif solution.units == "mm":
+        given = " (given)" if solution.scale == "baseline" else ""
+        parts.append(f"baseline {np.linalg.norm(pose.t):.5g} mm{given}")
+    else:
+        parts.append("up to scale")
+    rms = [f.rms_px for f in solution.frames if f.rms_px is not None]
+    if rms:
+        parts.append(f"residual {math.sqrt(np.mean(np.square(rms))):.3g} px RMS")
+    return "; ".join(parts)
+
+
+def unit_name(solution: Solution) -> str:
+    """Return the unit of length as a label."""
+    return "mm" if solution.units == "mm" else "baselines"
+
+
+def _quantity(value: Any, std: Any, status: str, unit: str) -> str:
+    if value is None:
+        return f"unknown ({status})"
+    if status == "fixed":
+        return f"{value:.6g} {unit} (given)"
+    doubt = "" if status == "measured" else f" ({status})"
+    if isinstance(std, float | int) and std > 0:
+        return f"{' '.join(interval(value, std))} {unit} (95 %){doubt}"
+    return f"{value:.6g} {unit}{doubt}"

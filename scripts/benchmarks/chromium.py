@@ -84,12 +84,13 @@ class Page:
                 "Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1
             )  # fmt: skip
 
-    def screenshot(self, path: Path, whole: bool = False, scale: float = 1.0) -> None:
-        """Save what the window shows, or the whole page, as PNG."""
+    def screenshot(self, path: Path, part: tuple[float, float] | None = None) -> None:
+        """Save as PNG what the window shows, or the page from one height to another, CSS pixels."""
         parameters: dict[str, Any] = {}
-        if whole:
-            size = self.send("Page.getLayoutMetrics")["cssContentSize"]
-            parameters = {"captureBeyondViewport": True, "clip": {**size, "scale": scale}}
+        if part is not None:
+            width = self.send("Page.getLayoutMetrics")["cssContentSize"]["width"]
+            clip = {"x": 0, "y": part[0], "width": width, "height": part[1] - part[0], "scale": 1}
+            parameters = {"captureBeyondViewport": True, "clip": clip}
         data = self.send("Page.captureScreenshot", format="png", **parameters)["data"]
         path.write_bytes(base64.b64decode(data))
 

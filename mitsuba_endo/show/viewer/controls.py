@@ -7,7 +7,7 @@ from typing import Any
 
 from ...records.calibration import Snapshot
 from ..content import Content
-from ..figures import headline
+from ..numbers import headline
 from .choice import Choice
 from .cost_chart import add_cost_chart, chart_data
 from .picking import Picker
@@ -134,10 +134,14 @@ class Controls:
 
     def clicked(self, event: Any) -> None:
         """Pick a point where a click's ray meets the surface."""
+        self.measure_along(event.ray_direction, event.ray_origin)
+
+    def measure_along(self, direction: Any, origin: Any = (0.0, 0.0, 0.0)) -> None:
+        """Pick a point where a ray meets the surface; by default one of the first camera."""
         with self._lock:
             if self.choice.snapshot is None and self.choice.surface:
                 surfaces = self.stage.shown_surfaces(self.choice)
-                self.picker.add(event.ray_origin, event.ray_direction, surfaces)
+                self.picker.add(origin, direction, surfaces)
             else:
                 self.picker.words = "Show the result's surface first."
             self._told.content = self.picker.words
