@@ -6,7 +6,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/.stamps
 
-.PHONY: help demo test test-slow lint format docs benchmark clean
+.PHONY: help demo test test-slow lint format docs benchmark reproduce clean
 
 help:
 	@echo "make demo       install into $(VENV) and calibrate a synthetic endoscope (demo-output/)"
@@ -16,6 +16,7 @@ help:
 	@echo "make format     let ruff mend the layout"
 	@echo "make docs       build the documentation (site/)"
 	@echo "make benchmark  compare with pycolmap and the published solver (benchmark-output/)"
+	@echo "make reproduce  run the paper's experiments (reproduce-output/), write docs/results.md"
 
 demo: $(STAMPS)/core
 	$(BIN)/mitsuba-endo demo --out demo-output
@@ -41,8 +42,11 @@ docs: $(STAMPS)/docs
 benchmark: $(STAMPS)/benchmark
 	$(BIN)/python scripts/benchmark.py --out benchmark-output
 
+reproduce: $(STAMPS)/reproduce
+	$(BIN)/python scripts/reproduce_all.py --out reproduce-output --page docs/results.md
+
 clean:
-	rm -rf $(VENV) build *.egg-info demo-output benchmark-output site
+	rm -rf $(VENV) build *.egg-info demo-output benchmark-output reproduce-output site
 
 $(STAMPS)/venv:
 	$(PYTHON) -m venv $(VENV)
@@ -53,6 +57,6 @@ $(STAMPS)/core: $(STAMPS)/venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable .
 	touch $@
 
-$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/docs $(STAMPS)/benchmark: $(STAMPS)/%: $(STAMPS)/core
+$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/docs $(STAMPS)/benchmark $(STAMPS)/reproduce: $(STAMPS)/%: $(STAMPS)/core
 	$(BIN)/python -m pip install --quiet --editable ".[$*]"
 	touch $@
