@@ -160,5 +160,5 @@ class CameraModel:
 
     @cached_property
     def grid_rays(self) -> NDArray[np.float64]:
-        """Unit directions (height, width, 3) of all pixel centres; inverting the lens takes long."""
+        """Unit directions (height, width, 3) of all pixels, kept: inverting the lens takes long."""
         return self.rays(self.pixel_grid())
