@@ -29,6 +29,10 @@ def subsurface_blur(
     from the one before by two passes, along rows and columns, over 13 samples. Light that enters
     where the camera does not look is missed.
 
+    Measured against the medium (``scripts/benchmark.py --only capture``: a 0.3 mm line, mean free
+    path 0.5 mm, index 1.5): 12 % of the light lies elsewhere, the peak is 26 % too low; without
+    any spread it would be 40 % and 84 % too high.
+
     Args:
         image: (h, w, 3) diffusely reflected radiance.
         points: (h, w, 3) surface points of the pixels, mm; NaN where there is none.
