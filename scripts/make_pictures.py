@@ -28,8 +28,8 @@ from mitsuba_endo.show.tonemap import tonemap
 from mitsuba_endo.show.truth import find_truth
 from mitsuba_endo.show.viewer import address, open_viewer, running_server
 
-WIDTH, HEIGHT = 1240, 860
-SETTLE = 3.0
+WIDTH, HEIGHT = 1240, 930
+SETTLE = 10.0
 """Seconds that software WebGL needs to draw."""
 
 
@@ -72,9 +72,9 @@ def _report(result: Path, out: Path) -> None:
         page.open(path.as_uri())
         time.sleep(1)
         parts = []
-        for first, last in (("h1", ".viewer"), (".space", ".space")):
+        for first, last, above in (("h1", ".viewer", 20), (".space", ".space", 60)):
             top, bottom = page.evaluate(
-                f"[document.querySelector('{first}').getBoundingClientRect().top - 20, "
+                f"[document.querySelector('{first}').getBoundingClientRect().top - {above}, "
                 f"document.querySelector('{last}').getBoundingClientRect().bottom + 20]"
             )
             page.screenshot(Path(folder) / "part.png", (top, bottom))
@@ -92,7 +92,7 @@ def _viewer(result: Path, out: Path) -> None:
         page.wait_for("document.body.innerText.includes('Measure')", 60)
         # A notice about software WebGL lies over the scene.
         page.evaluate("document.querySelector('.mantine-Notification-closeButton')?.click()")
-        viewer.controls.change(rays=True)
+        viewer.controls.boxes["rays"].value = True
         camera = calibration.camera
         corner = np.array([camera.width, camera.height], float)
         for place in ((0.3, 0.25), (0.55, 0.8)):

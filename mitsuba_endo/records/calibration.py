@@ -71,6 +71,8 @@ class Snapshot:
     """0 is the start."""
     cost: float | None
     """As in :class:`TraceRow`; None at the start."""
+    scale_px: float | None
+    """Likewise."""
     focal: list[float]
     """Of every frame, pattern pixels."""
     surfaces: list[NDArray[np.float64]]

@@ -56,6 +56,7 @@ def save_history(path: str | Path, history: Sequence[Snapshot]) -> None:
     arrays: dict[str, Any] = {
         "iteration": np.array([s.iteration for s in history]),
         "cost": np.array([np.nan if s.cost is None else s.cost for s in history]),
+        "scale_px": np.array([np.nan if s.scale_px is None else s.scale_px for s in history]),
         "focal": np.array([s.focal for s in history]),
         "world_from_camera": _matrices([s.world_from_camera for s in history]),
         "projector_from_camera": _matrices([s.projector_from_camera for s in history]),
@@ -99,7 +100,8 @@ def load_history(folder: str | Path) -> list[Snapshot]:
             return [
                 Snapshot(
                     iteration=int(data["iteration"][i]),
-                    cost=None if np.isnan(data["cost"][i]) else float(data["cost"][i]),
+                    cost=_or_none(data["cost"][i]),
+                    scale_px=_or_none(data["scale_px"][i]),
                     focal=data["focal"][i].tolist(),
                     surfaces=[data[f"vertices_{i}_{s}"].astype(np.float64) for s in surfaces],
                     faces=meshes[int(mesh)],
@@ -110,6 +112,10 @@ def load_history(folder: str | Path) -> list[Snapshot]:
             ]
     except (KeyError, ValueError, IndexError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
         raise InputError("is not a readable history", str(path), "delete it") from None
+
+
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
 
 
 def _matrices(poses: Sequence[Sequence[RigidTransform]]) -> NDArray[np.float64]:

@@ -31,7 +31,7 @@ class History:
         self.snapshots.clear()
         self._before = 0
         self._set_meshes(problem)
-        self._add(0, None, state)
+        self._add(0, None, None, state)
 
     def go_on(self, problem: Problem) -> None:
         """Continue with other surfaces; iterations are counted on."""
@@ -43,7 +43,7 @@ class History:
 
         def record(row: TraceRow, state: State) -> None:
             row = replace(row, iteration=self._before + row.iteration)
-            self._add(row.iteration, row.cost, state)
+            self._add(row.iteration, row.cost, row.scale_px, state)
             report(row, state)
 
         return record
@@ -55,10 +55,13 @@ class History:
         self._parts = [(kept, d[kept]) for (kept, _), d in zip(coarse, directions, strict=True)]
         self._faces = [faces for _, faces in coarse]
 
-    def _add(self, iteration: int, cost: float | None, state: State) -> None:
+    def _add(
+        self, iteration: int, cost: float | None, scale_px: float | None, state: State
+    ) -> None:
         snapshot = Snapshot(
             iteration=iteration,
             cost=cost,
+            scale_px=scale_px,
             focal=[float(np.exp(v[INTRINSICS["focal"]][0])) for v in state.intrinsics],
             surfaces=[
                 directions / rho[kept][:, None]

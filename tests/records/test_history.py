@@ -24,7 +24,8 @@ def snapshot(iteration: int, faces: list[np.ndarray]) -> Snapshot:
     rng = np.random.default_rng(iteration)
     poses = [RigidTransform.of([0.1 * i, -0.2, iteration], [i, 2, 3]) for i in range(2)]
     return Snapshot(
-        iteration, None if iteration == 0 else 1 / iteration, [300.0 + iteration, 290.0],
+        iteration, None if iteration == 0 else 1 / iteration,
+        None if iteration == 0 else 2 / iteration, [300.0 + iteration, 290.0],
         [rng.normal([0, 0, 7], size=(f.max() + 1, 3)) for f in faces], faces, poses, poses[::-1],
     )  # fmt: skip
 
@@ -38,6 +39,7 @@ def test_comes_back(tmp_path: Path):
     found = load_history(tmp_path)
     assert [s.iteration for s in found] == [0, 1, 2]
     assert [s.cost for s in found] == [None, 1.0, 0.5]
+    assert [s.scale_px for s in found] == [None, 2.0, 1.0]
     for mine, read in zip(history, found, strict=True):
         assert read.focal == mine.focal
         for a, b in zip(mine.surfaces, read.surfaces, strict=True):

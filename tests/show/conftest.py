@@ -117,7 +117,8 @@ def _history(surface: SurfaceEstimate, steps: list[RigidTransform]) -> list[Snap
     corners = surface.vertices[[0, 149, -150, -1]]
     return [
         Snapshot(
-            i, None if i == 0 else 1.0 / i, [FOCAL * (1 + off)] * len(steps),
+            i, None if i == 0 else 1.0 / i, None if i == 0 else 2.0 / i,
+            [FOCAL * (1 + off)] * len(steps),
             [(1 + off) * corners], faces, [s.inverse() for s in steps],
             [RigidTransform(PROJECTOR_FROM_CAMERA.R, (1 + off) * PROJECTOR_FROM_CAMERA.t)]
             * len(steps),

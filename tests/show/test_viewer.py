@@ -157,6 +157,7 @@ def test_live_view_shows_every_iteration(server: Any, calibration: Calibration):
     assert {"/iteration/frame_2/camera", "/iteration/frame_0/projector"} <= set(live.nodes.visible)
     np.testing.assert_array_equal(live._chart.data[0], [1, 2])
     np.testing.assert_array_equal(live._chart.data[1], [1.0, 0.5])
+    np.testing.assert_array_equal(live._chart.data[2], [2.0, 1.0])
     live.end("converged")
     assert live._state.content == "**converged**"
     live.show(calibration.history[0])

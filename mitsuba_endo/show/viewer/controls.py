@@ -2,7 +2,6 @@
 
 import threading
 from dataclasses import replace
-from html import escape
 from typing import Any
 
 from ...records.calibration import Snapshot
@@ -10,6 +9,7 @@ from ..content import Content
 from ..numbers import headline
 from .choice import Choice
 from .cost_chart import add_cost_chart, chart_data
+from .nodes import small
 from .picking import Picker
 from .stage import Stage
 
@@ -23,6 +23,8 @@ class Controls:
         self.server, self.content, self.stage = server, content, stage
         self.choice = Choice(frame=0 if len(content.surfaces) > 1 else None)
         self.picker = Picker(server, content)
+        self.boxes: dict[str, Any] = {}
+        """Check boxes by the choice that they are for."""
         self._lock = threading.RLock()
         self._history = content.calibration.history
         self._say_result()
@@ -94,6 +96,7 @@ class Controls:
     def _toggle(self, label: str, field: str, value: bool, hint: str | None = None) -> Any:
         box = self.server.gui.add_checkbox(label, value, hint=hint)
         box.on_update(lambda _: self.change(**{field: box.value}))
+        self.boxes[field] = box
         return box
 
     def _add_iterations(self) -> None:
@@ -161,13 +164,7 @@ def snapshot_words(snapshot: Snapshot) -> str:
     """Say in one line what an iteration found."""
     focal = sorted(set(snapshot.focal))
     f = f"f = {focal[0]:.2f}" if len(focal) == 1 else f"f = {focal[0]:.1f} to {focal[-1]:.1f}"
-    cost = "start" if snapshot.cost is None else f"cost {snapshot.cost:.4g}"
+    cost = "start"
+    if snapshot.cost is not None and snapshot.scale_px is not None:
+        cost = f"cost {snapshot.cost:.3g} at scale {snapshot.scale_px:.3g} px"
     return f"iteration {snapshot.iteration}: {cost}, {f} pattern px"
-
-
-def small(text: str) -> str:
-    """Return a line of small text as HTML of the panel."""
-    return (
-        '<div style="padding:0 14px 6px;font-size:12px;overflow-wrap:anywhere">'
-        f"{escape(text)}</div>"
-    )

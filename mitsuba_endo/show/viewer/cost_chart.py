@@ -7,32 +7,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...records.calibration import Snapshot
-from ..colours import CAMERA, PROJECTOR
+from ..colours import CAMERA, PROJECTOR, UNUSED
+from .nodes import small
 
-Data = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Data = tuple[NDArray[np.float64], ...]
+NOTE = (
+    "Blue: robust cost per correspondence, in units of the robust scale, and so it jumps where "
+    "that changes. Grey: the scale, pattern px."
+)
 
 
 def chart_data(history: Sequence[Snapshot], marked: int | None) -> Data:
-    """Return iterations, their costs, and the cost of the marked one with NaN elsewhere."""
-    rows = [(s.iteration, s.cost, i) for i, s in enumerate(history) if s.cost is not None]
-    rows = rows or [(0, 1.0, -1)]
-    cost = np.array([row[1] for row in rows], float)
-    mark = np.array([row[2] == marked for row in rows])
-    return np.array([row[0] for row in rows], float), cost, np.where(mark, cost, np.nan)
+    """Return iterations, costs, scales, and the cost of the marked one with NaN elsewhere."""
+    rows = [(s.iteration, s.cost, s.scale_px, i) for i, s in enumerate(history) if s.cost]
+    iteration, cost, scale, index = np.array(rows or [(0, 1.0, 1.0, -1)], float).T
+    return iteration, cost, scale, np.where(index == marked, cost, np.nan)
 
 
 def add_cost_chart(server: Any, history: Sequence[Snapshot]) -> Any:
-    """Add the chart to the panel."""
+    """Add the chart to the panel, with a note of what it shows."""
     from viser import uplot
 
     line = uplot.Series(label="cost", stroke=CAMERA, width=2, points={"show": True})
+    scale = uplot.Series(label="scale", stroke=UNUSED, width=1.5, dash=(5.0, 4.0))
     mark = uplot.Series(
         label="shown", stroke=PROJECTOR, width=0,
         points={"show": True, "size": 11, "fill": PROJECTOR},
     )  # fmt: skip
-    return server.gui.add_uplot(
+    chart = server.gui.add_uplot(
         data=chart_data(history, None),
-        series=(uplot.Series(label="iteration"), line, mark),
+        series=(uplot.Series(label="iteration"), line, scale, mark),
         scales={"x": uplot.Scale(time=False), "y": uplot.Scale(distr=3)},
         axes=(
             uplot.Axis(label="iteration", labelSize=18, size=34),
@@ -42,3 +46,5 @@ def add_cost_chart(server: Any, history: Sequence[Snapshot]) -> Any:
         padding=(14, 10, 0, 0),
         aspect=1.9,
     )
+    server.gui.add_html(small(NOTE))
+    return chart

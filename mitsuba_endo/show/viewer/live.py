@@ -9,9 +9,9 @@ from ...records.calibration import Snapshot
 from ...records.rig import Rig
 from ..colours import CAMERA, PROJECTOR
 from ..places import REACH, camera_corners, pattern_corners, pyramid
-from .controls import small, snapshot_words
+from .controls import snapshot_words
 from .cost_chart import add_cost_chart, chart_data
-from .nodes import Nodes
+from .nodes import Nodes, small
 from .stage import light, look_from, put_snapshot_surface, snapshot_place
 
 

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 from matplotlib.colors import to_rgb
@@ -59,3 +60,11 @@ def rgb_bytes(colour: str) -> tuple[int, int, int]:
     """Return a matplotlib colour as 0 to 255."""
     r, g, b = (round(255 * c) for c in to_rgb(colour))
     return r, g, b
+
+
+def small(text: str) -> str:
+    """Return a line of small text as HTML of the panel."""
+    return (
+        '<div style="padding:0 14px 6px;font-size:12px;overflow-wrap:anywhere">'
+        f"{escape(text)}</div>"
+    )
