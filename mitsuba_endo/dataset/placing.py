@@ -109,8 +109,7 @@ class _Judge:
         """Return the share of the surface's image in which its faces point away."""
         ways = world_from_camera.rotate(self.camera.grid_rays.reshape(-1, 3))
         met = self.scene.cast(world_from_camera.t, ways)
-        a, b, c = (self.mesh.vertices[self.mesh.faces[met.triangle, i]] for i in range(3))
-        away = np.einsum("ni,ni->n", np.cross(b - a, c - a), ways) > 0
+        away = np.einsum("ni,ni->n", met.normals, ways) > 0
         return float(away[met.hit].mean()) if met.hit.any() else 0.0
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..capture.creases import with_creases
 from ..decode.grid_pattern import CodedGrid
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
@@ -34,7 +35,7 @@ class TruthMaps:
     depth: NDArray[np.float32]
     """(H, W) z in the camera's frame, mm."""
     normals: NDArray[np.float32]
-    """(H, W, 3) smooth unit normals in the camera's frame, towards the camera."""
+    """(H, W, 3) unit normals in the camera's frame, towards the camera; smooth but at creases."""
     visible: NDArray[np.bool_]
     """(H, W) the pattern lights it."""
     shadow: NDArray[np.bool_]
@@ -69,7 +70,7 @@ def truth_maps(
     size = np.array([grid.width, grid.height])
     with np.errstate(invalid="ignore"):
         inside = ((q >= -0.5) & (q <= size - 0.5)).all(1)
-    lit = inside & _same_side(mesh, hits, ways, light) & scene.reaches(light, hits.points)
+    lit = inside & _same_side(hits, ways, light) & scene.reaches(light, hits.points)
     truth = grid.truth(q)
     normals = world_from_camera.inverse().rotate(_normals(mesh, hits, ways))
     q_image, visible = q.reshape(*shape, 2), lit.reshape(shape)
@@ -87,27 +88,26 @@ def truth_maps(
     )
 
 
-def _same_side(mesh: Mesh, hits: Hits, ways: Array, light: Array) -> NDArray[np.bool_]:
+def _same_side(hits: Hits, ways: Array, light: Array) -> NDArray[np.bool_]:
     """Tell where the projector is on the side of the face that the camera sees."""
-    a, b, c = (mesh.vertices[mesh.faces[hits.triangle, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    to_camera = -np.einsum("ni,ni->n", normal, ways)
-    to_light = np.einsum("ni,ni->n", normal, light - hits.points)
+    to_camera = -np.einsum("ni,ni->n", hits.normals, ways)
+    to_light = np.einsum("ni,ni->n", hits.normals, light - hits.points)
     with np.errstate(invalid="ignore"):
         return to_camera * to_light > 0
 
 
 def _normals(mesh: Mesh, hits: Hits, ways: Array) -> Array:
-    """Return (N, 3) unit normals in the world, interpolated between vertices; NaN without hit."""
-    corners = mesh.faces[hits.triangle]
-    a, b, c = (mesh.vertices[corners[:, i]] for i in range(3))
-    face = np.cross(b - a, c - a)
+    """Return (N, 3) unit normals in the world, as the photograph is shaded; NaN without hit."""
+    shaded = Mesh(*with_creases(mesh))
+    corners = shaded.faces[hits.triangle]
+    a, b, c = (shaded.vertices[corners[:, i]] for i in range(3))
+    face, rest = hits.normals, hits.points - a
     square = np.einsum("ni,ni->n", face, face)
-    rest = hits.points - a
     v = np.einsum("ni,ni->n", np.cross(rest, c - a), face) / square
     w = np.einsum("ni,ni->n", np.cross(b - a, rest), face) / square
-    weights = np.stack([1 - v - w, v, w], 1)
-    normal = np.einsum("nk,nki->ni", weights, vertex_normals(mesh)[corners])
+    smooth = vertex_normals(shaded)
+    na, nb, nc = (smooth[corners[:, i]] for i in range(3))
+    normal = na + v[:, None] * (nb - na) + w[:, None] * (nc - na)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     towards = np.where(np.einsum("ni,ni->n", normal, ways) > 0, -1.0, 1.0)
     return np.where(hits.hit[:, None], normal * towards[:, None], np.nan)

@@ -31,6 +31,8 @@ class Hits:
     """(N, 3) in the world, computed in double precision; meaningless without a hit."""
     triangle: NDArray[np.int64]
     """(N,) index of the face; 0 without a hit."""
+    normals: NDArray[np.float64]
+    """(N, 3) of the face, twice its area long, as its winding has it."""
     hit: NDArray[np.bool_]
     """(N,)."""
 
@@ -85,7 +87,10 @@ class MeshScene:
         along = np.einsum("ni,ni->n", normal, directions)
         distance = np.einsum("ni,ni->n", normal, a - origin) / np.where(along == 0, np.nan, along)
         return Hits(
-            origin + distance[:, None] * directions, index, hit.numpy() & np.isfinite(distance)
+            origin + distance[:, None] * directions,
+            index,
+            normal,
+            hit.numpy() & np.isfinite(distance),
         )
 
     def reaches(

@@ -1,6 +1,7 @@
 """A segment of colon seen from inside, with optional polyps of known size."""
 
 from dataclasses import dataclass as plain_dataclass
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -215,7 +216,13 @@ class Colon:
 
     def _line(self) -> CentreLine:
         reach = self.length + self.radius
-        return CentreLine(-self.behind, self.length, reach, self.bend, self.bend_towards)
+        return _centre_line(-self.behind, self.length, reach, self.bend, self.bend_towards)
+
+
+@lru_cache(maxsize=4)
+def _centre_line(*parameters: float) -> CentreLine:
+    """Keep the line: it integrates its path once, and points are asked of it many times."""
+    return CentreLine(*parameters)
 
 
 def _graded(
