@@ -56,10 +56,12 @@ def distances(points: Floats, truth: Truth) -> Floats:
 def frame_scale(found: Calibration, truth: Truth, frame: int) -> float:
     """Return by how much a surface, seen from one frame, is larger than the true one.
 
-    The surface is that of a calibration of this frame alone or of all.
+    The surface is that of a calibration of this frame alone or of all; NaN if it left this out.
     """
-    alone = len(found.frames) == 1
-    at = 0 if alone else frame
+    names = [f.name for f in found.frames]
+    if f"frame_{frame}.npz" not in names:
+        return float("nan")
+    at = names.index(f"frame_{frame}.npz")
     pose = found.solution.frames[at].world_from_camera.to_transform()
     assert pose is not None
     camera, true_pose = truth.camera, truth.world_from_camera[frame]

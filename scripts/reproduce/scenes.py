@@ -119,7 +119,7 @@ def polyp_view(seed: int, width: int) -> PolypView:
 
 
 def _look_at(polyp: PolypTruth, mesh: Mesh, rng: np.random.Generator) -> RigidTransform:
-    """Return world_from_camera of a camera from which nothing hides the polyp's top."""
+    """Return world_from_camera of a camera that sees the polyp's top, as its projector does."""
     backend.ensure()
     caster = RayCaster(mesh.vertices, mesh.faces)
     top = polyp.base + polyp.height * polyp.normal
@@ -129,12 +129,21 @@ def _look_at(polyp: PolypTruth, mesh: Mesh, rng: np.random.Generator) -> RigidTr
         tilt = np.radians(rng.uniform(10, 50))
         eye = top + rng.uniform(20, 32) * (np.cos(tilt) * polyp.normal + np.sin(tilt) * side)
         way = (top - eye) / np.linalg.norm(top - eye)
-        free = caster.range(eye, np.stack([way, polyp.normal, -polyp.normal, side, -side]))
-        inside = np.nanmin(free[1:]) > 6.0  # not in the wall
-        if inside and free[0] > np.linalg.norm(top - eye) - 0.5:
-            right = np.cross([0.0, 1.0, 0.0], way)
-            right /= np.linalg.norm(right)
-            facing = np.column_stack([right, np.cross(way, right), way])
-            turn = rotation_from_vector([*rng.normal(0, 0.12, 2), rng.normal(0, 0.5)])
-            return RigidTransform.of(facing @ turn, eye)
+        right = np.cross([0.0, 1.0, 0.0], way)
+        right /= np.linalg.norm(right)
+        facing = np.column_stack([right, np.cross(way, right), way])
+        turn = rotation_from_vector([*rng.normal(0, 0.12, 2), rng.normal(0, 0.5)])
+        pose = RigidTransform.of(facing @ turn, eye)
+        lamp = (pose @ PROJECTOR.inverse()).t
+        if all(_sees(caster, device, top) for device in (eye, lamp)):
+            return pose
     raise RuntimeError("no place from which the polyp is seen")
+
+
+def _sees(caster: RayCaster, device: NDArray[np.float64], point: NDArray[np.float64]) -> bool:
+    """Tell whether a device is 4 mm from every wall and sees the point."""
+    way = point - device
+    distance = float(np.linalg.norm(way))
+    around = np.concatenate([np.eye(3), -np.eye(3)])
+    ranges = caster.range(device, np.concatenate([(way / distance)[None], around]))
+    return bool(ranges[0] > distance - 0.5 and np.nanmin(ranges[1:]) > 4.0)
