@@ -9,7 +9,7 @@ from ..agreement import agreeing
 from ..grid_pattern import CodedGrid
 from ..normalise import one_channel
 from .graph import GridGraph, build_graph
-from .heads import Heads
+from .heads import Heads, smoothed
 from .identify import Identity, identify
 from .network import Network
 from .nodes import larger
@@ -70,6 +70,7 @@ def decode_heads(heads: Heads, pattern: CodedGrid) -> DecodedGrid:
     Raises:
         InputError: no code of the pattern's size was found.
     """
+    heads = smoothed(heads)
     graph = build_graph(heads)
     identity = identify(graph, pattern.code)
     lattice = unwrap(heads, graph.nodes, identity)

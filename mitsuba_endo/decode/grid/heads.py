@@ -1,8 +1,9 @@
 """What the network says of each pixel."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,8 @@ from ...errors import InputError
 CHANNELS = (
     "sin_u", "cos_u", "sin_v", "cos_v", "code_R", "code_S", "code_L", "confidence", "edge",
 )  # fmt: skip
+SMOOTHING = 1.0
+"""Standard deviation, pixels: far below a period, above the network's noise from pixel to pixel."""
 CODES = (1, 0, -1)
 """Codes in the order of their channels: R, S, L."""
 
@@ -49,6 +52,15 @@ def read_heads(output: NDArray[np.float32], channels: Sequence[str]) -> Heads:
         confidence=_sigmoid(at["confidence"]),
         edge=_sigmoid(at["edge"]),
     )
+
+
+def smoothed(heads: Heads) -> Heads:
+    """Return heads whose phase is averaged over a pixel around by confidence, on the circle."""
+    weight = np.maximum(heads.confidence, 1e-3)[..., None]
+    angle = 2 * np.pi * heads.phase
+    parts = (cv2.GaussianBlur(f(angle) * weight, (0, 0), SMOOTHING) for f in (np.sin, np.cos))
+    turns = np.arctan2(*parts) / (2 * np.pi)
+    return replace(heads, phase=turns.astype(np.float32))
 
 
 def _sigmoid(logit: NDArray[np.float32]) -> NDArray[np.float32]:

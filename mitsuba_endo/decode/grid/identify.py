@@ -14,7 +14,10 @@ from .windows import candidates
 MIN_NODES = 9
 """Of a part that is placed."""
 MIN_SCORE = 0.3
-"""Mean evidence of a placed part's nodes."""
+"""Mean evidence of a placed part's nodes, if all of it is less than SURE."""
+SURE = 20.0
+"""Evidence that chance does not give: a placement has evidence s by chance with probability
+exp(-s) at most (Markov's inequality for likelihood ratios), and there are some 6,000 of them."""
 MIN_MARGIN = 6.0
 """Evidence of a placed part over its next best placement."""
 MIN_SHARE = 0.4
@@ -101,7 +104,7 @@ def _parts(
         if len(inside) < MIN_NODES:
             continue
         again = vote(place[inside], known[inside], pattern)
-        if again.score >= MIN_SCORE * len(inside) and again.margin >= MIN_MARGIN:
+        if again.score >= min(MIN_SCORE * len(inside), SURE) and again.margin >= MIN_MARGIN:
             found.append(_Part(members[inside], again.best, again.score, component))
     return found
 

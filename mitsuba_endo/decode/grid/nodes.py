@@ -9,7 +9,8 @@ from scipy.ndimage import minimum_filter
 
 from .heads import Heads
 
-MIN_CONFIDENCE = 0.5
+MIN_CONFIDENCE = 0.3
+"""Lower than a pixel's: what a node is told by its links as well."""
 REACH = 0.75
 """Pixels from a node's place to the nearest pixel's middle, with room for the slope's error."""
 SPACING = 5
@@ -58,7 +59,7 @@ def find_nodes(heads: Heads) -> Nodes:
     Each pixel takes one Newton step with the slope around it; where the step stays within the
     pixel, it ends at a node.
     """
-    phase = _smooth(heads)
+    phase = heads.phase
     slope = phase_slope(phase)
     inverse, regular = _inverse(slope)
     step = -np.einsum("hwij,hwj->hwi", inverse, phase)
@@ -71,14 +72,6 @@ def find_nodes(heads: Heads) -> Nodes:
     at = np.clip(np.stack([x, y], -1) + step[y, x], 0, shape - 1)
     code = cv2.blur(heads.code.transpose(1, 2, 0), (3, 3))
     return Nodes(at, slope[y, x].astype(np.float64), code[y, x].astype(np.float64))
-
-
-def _smooth(heads: Heads) -> NDArray[np.float32]:
-    """Average the phase over 3 x 3 pixels by confidence, on the circle."""
-    weight = np.maximum(heads.confidence, 1e-3)
-    parts = [f(2 * np.pi * heads.phase) * weight[..., None] for f in (np.sin, np.cos)]
-    sine, cosine = (cv2.GaussianBlur(p.astype(np.float32), (3, 3), 0.7) for p in parts)
-    return (np.arctan2(sine, cosine) / (2 * np.pi)).astype(np.float32)
 
 
 def phase_slope(phase: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ AGREEMENT = 0.8
 """Of the border to placed cells that must ask for the same place."""
 MAX_SLOPE = 0.25
 """Periods per pixel; where the pattern is more crowded, pixels mix several lines."""
-DOUBT = 2
+DOUBT = 4
 """Pixels around a contradiction between neighbouring cells that are left out."""
 UNKNOWN = np.iinfo(np.int32).min // 2
 
