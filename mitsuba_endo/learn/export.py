@@ -8,9 +8,10 @@ import onnx  # pyright: ignore[reportMissingImports]
 import torch
 from torch import nn
 
+from ..decode.grid.heads import CHANNELS
+from ..decode.grid.network import STRIDE
 from ..decode.normalise import INPUT_CHANNELS
 from ..files import atomic_path
-from .model import CHANNELS, STRIDE
 
 OPSET = 17
 """Read by onnxruntime from 1.12 and by OpenCV."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ..decode.grid.heads import Heads
 from .compose import Truth
 
 CONFIDENT = 0.5
@@ -36,9 +37,9 @@ class PixelMetrics:
         return [f.name for f in fields(cls)]
 
 
-def pixel_metrics(outputs: Sequence[NDArray[np.float32]], truths: Sequence[Truth]) -> PixelMetrics:
-    """Compare network outputs (9, H, W) with their truths."""
-    parts = [_compare(o, t) for o, t in zip(outputs, truths, strict=True)]
+def pixel_metrics(heads: Sequence[Heads], truths: Sequence[Truth]) -> PixelMetrics:
+    """Compare what the network says of images with their truths."""
+    parts = [_compare(h, t) for h, t in zip(heads, truths, strict=True)]
     error = np.concatenate([p[0] for p in parts])
     lit, accepted_lit, unlit, accepted_unlit, asked, right, edges, found, both = (
         sum(p[1][k] for p in parts) for k in range(9)
@@ -56,21 +57,17 @@ def pixel_metrics(outputs: Sequence[NDArray[np.float32]], truths: Sequence[Truth
     )
 
 
-def phase_error(output: NDArray[np.float32], truth: Truth) -> NDArray[np.float32]:
-    """Return the error (2, H, W) in periods, 0 to 1/2."""
-    phase = np.arctan2(output[0:4:2], output[1:4:2]) / (2 * np.pi)
-    away = phase - truth.lattice
+def phase_error(heads: Heads, truth: Truth) -> NDArray[np.float32]:
+    """Return the error (H, W, 2) in periods, 0 to 1/2."""
+    away = heads.phase - truth.lattice.transpose(1, 2, 0)
     return np.abs(away - np.round(away)).astype(np.float32)
 
 
-def _compare(
-    output: NDArray[np.float32], truth: Truth
-) -> tuple[NDArray[np.float32], tuple[int, ...]]:
-    accepted = output[7] > np.log(CONFIDENT / (1 - CONFIDENT))
+def _compare(heads: Heads, truth: Truth) -> tuple[NDArray[np.float32], tuple[int, ...]]:
+    accepted, found = heads.confidence > CONFIDENT, heads.edge > EDGE_FOUND
     asked = truth.code >= 0
-    right = asked & (output[4:7].argmax(0) == truth.code)
-    found = output[8] > np.log(EDGE_FOUND / (1 - EDGE_FOUND))
-    error = phase_error(output, truth)[:, accepted & truth.lit].T
+    right = asked & (heads.code.argmax(0) == truth.code)
+    error = phase_error(heads, truth)[accepted & truth.lit]
     counts = (
         truth.lit, accepted & truth.lit, ~truth.lit, accepted & ~truth.lit, asked, right,
         truth.edge, found, found & truth.edge,

@@ -5,14 +5,8 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
+from ..decode.grid.heads import CHANNELS
 from ..decode.normalise import INPUT_CHANNELS
-
-CHANNELS = (
-    "sin_u", "cos_u", "sin_v", "cos_v", "code_R", "code_S", "code_L", "confidence", "edge",
-)  # fmt: skip
-"""Of the output: sine and cosine of the lattice coordinates' phase, then logits."""
-STRIDE = 16
-"""Image height and width must be multiples of it."""
 
 
 def _block(inputs: int, outputs: int) -> nn.Sequential:
@@ -24,7 +18,10 @@ def _block(inputs: int, outputs: int) -> nn.Sequential:
 
 
 class DecoderNet(nn.Module):
-    """(N, 2, H, W) to (N, 9, H, W), H and W multiples of 16; see :data:`CHANNELS`.
+    """(N, 2, H, W) to (N, 9, H, W), H and W multiples of STRIDE.
+
+    The output's channels are those of ``decode.grid.heads``: sine and cosine of the lattice
+    coordinates' phases, then logits.
 
     The first convolution has stride 2 and a 4 x 4 kernel, so that it sees every pixel alike. At the
     end features are enlarged bilinearly and joined with the image itself. There is no transposed

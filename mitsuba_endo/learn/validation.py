@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.settings import Effects
+from ..decode.grid.heads import CHANNELS, read_heads
 from ..decode.normalise import normalise
 from .cache import ViewCache
 from .compose import Look, Truth, compose
@@ -73,11 +74,11 @@ def evaluate(
         images: to decode.
         network: maps (2, H, W) to (9, H, W).
     """
-    outputs = [network(image.image) for image in images]
+    heads = [read_heads(network(image.image), CHANNELS) for image in images]
     scores = {}
     for scenario in SCENARIOS:
         chosen = [k for k, image in enumerate(images) if image.scenario == scenario]
         if chosen:
             truths = [images[k].truth for k in chosen]
-            scores[scenario] = pixel_metrics([outputs[k] for k in chosen], truths)
+            scores[scenario] = pixel_metrics([heads[k] for k in chosen], truths)
     return scores

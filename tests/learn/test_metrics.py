@@ -5,6 +5,7 @@ import pytest
 
 pytest.importorskip("torch")
 
+from mitsuba_endo.decode.grid.heads import CHANNELS, read_heads
 from mitsuba_endo.learn.compose import Truth
 from mitsuba_endo.learn.metrics import phase_error, pixel_metrics
 
@@ -29,9 +30,8 @@ def _case() -> tuple[np.ndarray, Truth]:
 def test_error_wraps():
     """Oracle: 0.02 and 0 periods, whatever whole periods the lattice counts."""
     output, truth = _case()
-    error = phase_error(output, truth)[:, truth.lit]
-    np.testing.assert_allclose(error[0], 0.02, atol=1e-5)
-    np.testing.assert_allclose(error[1], 0, atol=1e-5)
+    error = phase_error(read_heads(output, CHANNELS), truth)[truth.lit]
+    np.testing.assert_allclose(error, np.broadcast_to([0.02, 0], error.shape), atol=1e-5)
 
 
 def test_shares_are_counts():
@@ -42,7 +42,7 @@ def test_shares_are_counts():
     output[0:2, 0, 9] *= -1  # one accepted pixel is half a period off
     output[4:7, 0, 0:4] = np.array([[5, 0, 0, 5], [0, 5, 0, 0], [0, 0, 5, 0]])  # 3 of 4 codes
     output[8, :, 5:7] = 5  # all 4 edge pixels and 4 others
-    found = pixel_metrics([output], [truth])
+    found = pixel_metrics([read_heads(output, CHANNELS)], [truth])
     assert found.coverage == pytest.approx(20 / 30)
     assert found.false_share == pytest.approx(0.5)
     assert found.gross == pytest.approx(1 / 20)
@@ -59,12 +59,13 @@ def test_two_images_are_counted_together():
     output, truth = _case()
     accepted = output.copy()
     accepted[7] = 5
-    assert pixel_metrics([accepted, output], [truth, truth]).coverage == pytest.approx(0.5)
+    heads = [read_heads(image, CHANNELS) for image in (accepted, output)]
+    assert pixel_metrics(heads, [truth, truth]).coverage == pytest.approx(0.5)
 
 
 def test_nothing_accepted_is_no_number():
     """Oracle: no accepted pixel has no error; shares stay defined."""
     output, truth = _case()
-    found = pixel_metrics([output], [truth])
+    found = pixel_metrics([read_heads(output, CHANNELS)], [truth])
     assert np.isnan(found.median)
     assert found.coverage == 0

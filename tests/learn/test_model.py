@@ -10,8 +10,9 @@ torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
+from mitsuba_endo.decode.grid.heads import CHANNELS  # noqa: E402
 from mitsuba_endo.learn.export import export_onnx  # noqa: E402
-from mitsuba_endo.learn.model import CHANNELS, DecoderNet  # noqa: E402
+from mitsuba_endo.learn.model import DecoderNet  # noqa: E402
 
 SIZES = [(240, 320), (480, 640), (112, 208), (48, 64)]
 """Usual ones, and what images of odd sizes are padded to."""
