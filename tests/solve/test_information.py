@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.information import without_false_information
+from mitsuba_endo.solve.information import Information, without_false_information
 from tests.rigs import bumpy_sheet, plane, with_noise
 from tests.solve.problems import NOISE, SHEET, map_of, rig_file, small_rig
 
@@ -107,3 +107,39 @@ def test_fixed_focal_on_a_plane_is_an_answer(llvm: str):
     assert found.projector.focal.value == pytest.approx(330, rel=1e-12)
     pose = found.frames[0].projector_from_camera
     np.testing.assert_allclose(pose.t, rig.projector_from_camera.t, atol=0.1)
+
+
+class TestCovariance:
+    KNOWN = np.array([[50.0, 8.0, 0.0], [8.0, 2.0, 0.3], [0.0, 0.3, 4.0]])
+
+    def test_without_noise_on_the_surface(self):
+        """Oracle: the inverse."""
+        cov = Information(self.KNOWN, self.KNOWN).covariance()
+        np.testing.assert_allclose(cov, np.linalg.inv(self.KNOWN), rtol=1e-9)
+
+    def test_of_an_errors_in_variables_line(self):
+        """Oracle: the scatter of slopes, simulated.
+
+        y = a x with noise in both and corrected for it: x^2 overstates the information, and the
+        score varies by what the noisy x show.
+        """
+        rng = np.random.default_rng(0)
+        x = rng.normal(0, 1.0, 400)
+        own, sigma = 0.8, 0.5
+        slopes = []
+        for _ in range(4000):
+            seen = x + own * rng.standard_normal(400)
+            y = sigma * rng.standard_normal(400)  # the true slope is zero
+            slopes.append(seen @ y / (x @ x))
+        known, score = x @ x, x @ x + 400 * own**2
+        cov = Information(np.array([[known]]), np.array([[score]])).covariance()
+        assert sigma**2 * cov[0, 0] == pytest.approx(np.var(slopes), rel=0.06)
+        assert sigma**2 / known < 0.8 * np.var(slopes), "the inverse alone states too little"
+
+    def test_never_less_than_the_inverse_and_finite(self):
+        """Oracle: V below I counts as I; a direction that is next to unknown stays finite."""
+        small = Information(self.KNOWN, 0.5 * self.KNOWN).covariance()
+        np.testing.assert_allclose(small, np.linalg.inv(self.KNOWN), rtol=1e-9)
+        flat = np.diag([1.0, 1e-8])
+        assert np.isfinite(Information(flat, np.eye(2)).covariance()).all()
+        assert Information(flat, np.eye(2)).covariance()[1, 1] <= 1.01e10

@@ -19,11 +19,11 @@ from tests.range_scenes import Surface, bumpy_sheet, organ, random_relief
 from tests.solve.views import (
     POSE,
     Views,
+    assert_near,
     focal_error,
     frame_errors,
     look,
     projector_poses,
-    relief_surface,
     steps,
 )
 
@@ -31,14 +31,8 @@ pytestmark = pytest.mark.usefixtures("llvm")
 
 
 @pytest.fixture(scope="module")
-def surface() -> Surface:
-    return relief_surface()
-
-
-@pytest.fixture(scope="module")
-def views(surface: Surface) -> Views:
-    """Four views of one relief, each with a projector pose of its own."""
-    return look(surface, steps(4), projector_poses(4))
+def views(four_views: Views) -> Views:
+    return four_views
 
 
 def assert_right(
@@ -46,19 +40,16 @@ def assert_right(
 ) -> None:
     """Everything is within its physical limit, and the focal length within 4 deviations."""
     solution = result.solution
-    assert solution.outcome is Outcome.CONVERGED
+    assert_near(views, solution, focal=focal, baseline=baseline)
     assert solution.left_out == []
-    assert abs(focal_error(solution)) < focal
+    assert not any("do not rely" in w for w in solution.warnings)
     std = solution.projector.focal.std
     assert isinstance(std, float)
     assert abs(focal_error(solution)) * views.projector.focal < 4 * std
     for frame in solution.frames:
         error = frame_errors(views, frame)
-        assert abs(error.baseline) < baseline, frame.name
         assert error.projector < 0.05, frame.name
-        assert error.towards < 0.5, frame.name
         assert error.camera < 0.2, frame.name
-        assert error.position < 0.2, frame.name
 
 
 def test_paper_mode(views: Views) -> None:

@@ -16,7 +16,7 @@ from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Rig
-from mitsuba_endo.records.solution import Frame, Solution
+from mitsuba_endo.records.solution import Frame, Outcome, Solution
 from tests.range_scenes import Surface, cast, height_field
 from tests.rigs import lopsided_camera
 
@@ -122,6 +122,11 @@ def look(
     return Views(maps, camera, projector, world_from_camera, projector_from_camera, points)
 
 
+def several(surface: Surface, count: int) -> Views:
+    """Views of one surface, each with a projector pose of its own."""
+    return look(surface, steps(count), projector_poses(count))
+
+
 @dataclass(frozen=True)
 class Errors:
     """How far one frame of a solution is from the truth."""
@@ -164,3 +169,16 @@ def focal_error(solution: Solution) -> float:
     value = solution.projector.focal.value
     assert isinstance(value, float)
     return value / FOCAL - 1
+
+
+def assert_near(
+    views: Views, solution: Solution, *, focal: float = 2e-3, baseline: float = 5e-3
+) -> None:
+    """Converged, and every frame that is part of it is within its physical limits."""
+    assert solution.outcome is Outcome.CONVERGED
+    assert abs(focal_error(solution)) < focal
+    for frame in solution.frames:
+        error = frame_errors(views, frame)
+        assert abs(error.baseline) < baseline, frame.name
+        assert error.towards < 0.5, frame.name
+        assert error.position < 0.2, frame.name
