@@ -11,6 +11,8 @@ from benchmarks import (
     bundle_adjustment,
     capture,
     dataset,
+    decoder,
+    decoder_end_to_end,
     emitter_cost,
     first_order,
     full_resolution,
@@ -22,6 +24,7 @@ from benchmarks import (
     robustness,
     scaling,
     shared_rig,
+    stacks,
     verdicts,
 )
 from benchmarks.report import Figure, save, show
@@ -47,6 +50,9 @@ BENCHMARKS = {
         verdicts,
         dataset,
         capture,
+        decoder,
+        decoder_end_to_end,
+        stacks,
     )
 }
 
