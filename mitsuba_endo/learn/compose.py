@@ -124,9 +124,9 @@ def compose(
     lamp = look.lamp * tissue * shading[..., 1]
     wet = np.zeros((h, w), np.float32)
     if look.wet:
-        shine = np.float32(look.wet) * highlights(shading[..., 2], rng)
-        laser = laser + np.float32(rng.uniform(0, 1)) * shine * laser
-        wet = np.float32(rng.uniform(0.1, 1)) * shine * shading[..., 1]
+        shine = look.wet * highlights(shading[..., 2], rng)
+        laser = (laser * (1 + shine * rng.uniform(0, 1))).astype(np.float32)
+        wet = (shine * shading[..., 1] * rng.uniform(0.1, 1)).astype(np.float32)
     # The camera exposes for the pattern, or for the brightest of all.
     metered = laser if rng.random() < 0.6 else laser + lamp + wet
     gain = effects.exposure / max(float(np.percentile(metered[::2, ::2], 99.5)), 1e-6)
