@@ -41,7 +41,7 @@ def solve(inputs: Path, refine: bool, count: int) -> Reconstruction:
 
 def main(out: Out = OUT / "focal", quick: Quick = False, workers: Workers = 2) -> None:
     """Solve all cases over seeds."""
-    seeds, width = (1, 72) if quick else (5, 160)
+    seeds, width = (1, 64) if quick else (5, 140)
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     with solvers(workers) as pool:
         for law, seed in product(("pinhole", "direction_cosine"), range(seeds)):

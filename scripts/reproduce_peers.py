@@ -37,7 +37,7 @@ LAWS = ("pinhole", "direction_cosine")
 
 def main(out: Out = OUT / "peers", quick: Quick = False) -> None:
     """Let every peer solve all captures, one after the other in a process of its own."""
-    seeds, width = (2, 64) if quick else (5, 160)
+    seeds, width = (2, 48) if quick else (5, 140)
     noise = Plain(sigma=0.3, outliers=0.01)
     truths, captures = {}, {}
     for law in LAWS:

@@ -27,7 +27,7 @@ from reproduce.tables import save_table
 from mitsuba_endo.show.figures import save_figure
 
 METHODS = {
-    "ours": peers.ours, "Adam": partial(peers.adam, iterations=2000),
+    "ours": peers.ours, "Adam": partial(peers.adam, iterations=1500),
     "pycolmap": peers.pycolmap_pinhole,
 }  # fmt: skip
 TITLES = ("focal error (%)", "distance of the points (mm)")
@@ -70,7 +70,7 @@ CURVES: Mapping[str, tuple[str, tuple[float, ...]]] = {
 
 def main(out: Out = OUT / "robustness", quick: Quick = False, workers: Workers = 2) -> None:
     """Draw all curves."""
-    seeds, width, length = (1, 56, 2) if quick else (3, 112, None)
+    seeds, width, length = (1, 48, 2) if quick else (3, 96, None)
     rows = []
     with solvers(workers) as pool:
         for what, (label, values) in CURVES.items():

@@ -136,4 +136,6 @@ def _colmap() -> Any:
     """Without static types: its stubs lack the options of Ceres."""
     import pycolmap  # pyright: ignore[reportMissingImports]
 
-    return pycolmap
+    colmap: Any = pycolmap
+    colmap.logging.minloglevel = 2  # errors: a wrong model makes Ceres warn at every step
+    return colmap
