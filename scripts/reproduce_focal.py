@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import typer
-from reproduce.capture import capture, read_inputs
+from reproduce.capture import decoded, read_inputs
 from reproduce.command import OUT, Out, Quick, Workers
-from reproduce.decoder_noise import DecoderNoise
 from reproduce.errors import shape_errors
 from reproduce.guarded import solvers
 from reproduce.methods import AT_ONE_PLACE, Reconstruction, reconstruct
@@ -46,12 +45,8 @@ def main(out: Out = OUT / "focal", quick: Quick = False, workers: Workers = 2) -
     with solvers(workers) as pool:
         for law, seed in product(("pinhole", "direction_cosine"), range(seeds)):
             truth = views_of(sphere_mesh(), 4, seed, law=law, width=width, play=0.2)
-            rng = np.random.default_rng(2000 + seed)
-            read = capture(
-                truth, truth.rig(WRONG),
-                lambda q, _, r=rng, t=truth: DecoderNoise().apply(q, t.size, r),
-                out / "captures" / f"{law}_{seed}",
-            )  # fmt: skip
+            folder = out / "captures" / f"{law}_{seed}"
+            read = decoded(truth, truth.rig(WRONG), 2000 + seed, folder)
             running = {c: pool.submit(solve, read.inputs, *c) for c in CASES}
             for case, job in running.items():
                 r = job.result()

@@ -15,9 +15,8 @@ from pathlib import Path
 import numpy as np
 import typer
 from matplotlib.figure import Figure
-from reproduce.capture import capture
+from reproduce.capture import decoded
 from reproduce.command import OUT, Out, Quick, Workers
-from reproduce.decoder_noise import DecoderNoise
 from reproduce.errors import Seen, rms_where_all_see, seen, shape_errors
 from reproduce.guarded import solvers
 from reproduce.methods import independent, joint, one_projector
@@ -41,13 +40,8 @@ def main(out: Out = OUT / "per_frame", quick: Quick = False, workers: Workers = 
         for seed in range(10, 10 + seeds):  # settings were chosen on others
             truth = views_of(stomach_mesh(seed), frames, seed, law="direction_cosine",
                              width=width, play=PLAY)  # fmt: skip
-            rng = np.random.default_rng(1000 + seed)
-            decoded = capture(
-                truth, truth.rig(focal_guess=300.0),
-                lambda q, _, r=rng, t=truth: DecoderNoise().apply(q, t.size, r),
-                out / "captures" / str(seed),
-            )  # fmt: skip
-            running = {n: pool.submit(method, decoded.inputs) for n, method in METHODS.items()}
+            read = decoded(truth, truth.rig(300.0), 1000 + seed, out / "captures" / str(seed))
+            running = {n: pool.submit(method, read.inputs) for n, method in METHODS.items()}
             found = {name: job.result() for name, job in running.items()}
             views = [seen(r.surface, truth, "rigid") for r in found.values()]
             common = rms_where_all_see(views)

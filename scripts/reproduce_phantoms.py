@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 import typer
 from matplotlib.figure import Figure
-from reproduce.capture import capture, read_inputs
+from reproduce.capture import decoded, read_inputs
 from reproduce.command import OUT, Out, Quick, Workers
-from reproduce.decoder_noise import DecoderNoise
 from reproduce.errors import rms_where_all_see, seen
 from reproduce.guarded import solvers
 from reproduce.methods import LEAN, Reconstruction, reconstruct
@@ -43,12 +42,7 @@ def main(out: Out = OUT / "phantoms", quick: Quick = False, workers: Workers = 2
     with solvers(workers) as pool:
         for name, (mesh, plane) in PHANTOMS.items():
             truth = views_of(mesh(1), frames, 1, law="direction_cosine", width=width, play=0.2)
-            rng = np.random.default_rng(4)
-            read = capture(
-                truth, truth.rig(1.1 * FOCAL),
-                lambda q, _, r=rng, t=truth: DecoderNoise().apply(q, t.size, r),
-                out / "captures" / name,
-            )  # fmt: skip
+            read = decoded(truth, truth.rig(1.1 * FOCAL), 4, out / "captures" / name)
             running = [pool.submit(solve, read.inputs, plane, n) for n in (1, frames)]
             found = [job.result() for job in running]
             views = [seen(r.surface, truth, "rigid") for r in found]

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from reproduce.capture import capture, read_inputs
+from reproduce.capture import decoded, read_inputs
 from reproduce.command import OUT, Out, Quick, Workers
-from reproduce.decoder_noise import DecoderNoise
 from reproduce.guarded import solvers
 from reproduce.pictures import sizes_picture
 from reproduce.scenes import polyp_view
@@ -46,13 +45,10 @@ def main(out: Out = OUT / "polyp", quick: Quick = False, workers: Workers = 2) -
     jobs = []
     with solvers(workers) as pool:
         for seed in range(100, 100 + draws):  # settings were chosen on others
-            view, rng = polyp_view(seed, width), np.random.default_rng(7000 + seed)
-            said = 1 + BASELINE_STD * rng.standard_normal()
-            read = capture(
-                view.truth, view.truth.rig(300.0, scale_error=said, scale_std=BASELINE_STD),
-                lambda q, _, r=rng, t=view.truth: DecoderNoise().apply(q, t.size, r),
-                out / "captures" / str(seed),
-            )  # fmt: skip
+            view = polyp_view(seed, width)
+            said = 1 + BASELINE_STD * np.random.default_rng(seed).standard_normal()
+            rig = view.truth.rig(300.0, scale_error=said, scale_std=BASELINE_STD)
+            read = decoded(view.truth, rig, 7000 + seed, out / "captures" / str(seed))
             jobs.append((view, pool.submit(solve, read.inputs, view.middle, view.outline)))
         found = [(view.diameter, job.result()) for view, job in jobs]
     save_table([_row(*f) for f in found], out, "polyp_draws")

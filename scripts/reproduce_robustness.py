@@ -7,21 +7,20 @@ frames, whose projectors move, pycolmap's bundle adjustment has no correspondenc
 it is drawn for one. A point is left out where a method gives nothing.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import typer
 from reproduce import peers
-from reproduce.capture import Capture, Truth, capture
+from reproduce.capture import Truth
 from reproduce.command import OUT, Out, Quick, Workers
+from reproduce.conditions import CURVES, Condition
 from reproduce.decoder_noise import Plain
 from reproduce.guarded import solvers
 from reproduce.peer_errors import calibration_errors, point_error
 from reproduce.pictures import curves
-from reproduce.scenes import FOCAL, stomach_mesh, views_of
 from reproduce.tables import save_table
 
 from mitsuba_endo.show.figures import save_figure
@@ -31,41 +30,6 @@ METHODS = {
     "pycolmap": peers.pycolmap_pinhole,
 }  # fmt: skip
 TITLES = ("focal error (%)", "distance of the points (mm)")
-
-
-@dataclass(frozen=True)
-class Condition:
-    """One setting; the defaults are those of all other curves."""
-
-    sigma: float = 0.3
-    outliers: float = 0.01
-    missing: float = 0.0
-    baseline: float = 1.0
-    """Over that of the scene, 6.3 mm."""
-    frames: int = 1
-    guess: float = 1.1
-    """Starting focal length over the true one."""
-
-    @property
-    def noise(self) -> Plain:
-        return Plain(self.sigma, self.outliers, self.missing)
-
-    def capture(self, seed: int, width: int, out: Any) -> tuple[Truth, Capture]:
-        """Make the capture of one seed."""
-        truth = views_of(stomach_mesh(seed), self.frames, seed, law="pinhole", width=width,
-                         play=0.2, baseline=self.baseline)  # fmt: skip
-        errors = partial(_read, self.noise, 10 * seed)
-        return truth, capture(truth, truth.rig(self.guess * FOCAL), errors, out)
-
-
-CURVES: Mapping[str, tuple[str, tuple[float, ...]]] = {
-    "sigma": ("noise (pattern px)", (0.1, 0.3, 0.6, 1.2)),
-    "outliers": ("share of gross errors", (0.0, 0.1, 0.2, 0.3, 0.4)),
-    "missing": ("share of the image missing", (0.0, 0.2, 0.4, 0.6)),
-    "baseline": ("baseline / 6.3 mm", (0.25, 0.5, 1.0, 2.0)),
-    "frames": ("frames", (1, 2, 4)),
-    "guess": ("starting focal length / true", (0.5, 0.7, 0.9, 1.1, 1.5, 2.0)),
-}
 
 
 def main(out: Out = OUT / "robustness", quick: Quick = False, workers: Workers = 2) -> None:
@@ -97,10 +61,6 @@ def main(out: Out = OUT / "robustness", quick: Quick = False, workers: Workers =
                                  TITLES[0]: float(focal), TITLES[1]: float(points)})  # fmt: skip
             save_figure(out / f"robustness_{what}.png", curves(found, label, TITLES))
     save_table(rows, out, "robustness")
-
-
-def _read(noise: Plain, seed: int, q: Any, frame: int) -> Any:
-    return noise.apply(q, seed + frame)
 
 
 def _errors(job: Any, truth: Truth, noise: Plain, seed: int) -> tuple[float, float]:

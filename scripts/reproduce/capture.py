@@ -19,6 +19,8 @@ from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig, Scale, load_
 from mitsuba_endo.rendering.synthetic import MeshScene
 from mitsuba_endo.shapes.mesh import Mesh
 
+from .decoder_noise import DecoderNoise
+
 INPUTS, TRUTH = "inputs", "truth"
 Errors = Callable[[NDArray[np.float64], int], NDArray[np.float64]]
 """From exact coordinates (H, W, 2) and the frame's number to what is read."""
@@ -93,6 +95,12 @@ def capture(truth: Truth, rig: Rig, errors: Errors, folder: Path) -> Capture:
     (folder / TRUTH).mkdir(parents=True, exist_ok=True)
     truth.mesh.save(folder / TRUTH / "surface.ply")
     return Capture(folder)
+
+
+def decoded(truth: Truth, rig: Rig, seed: int, folder: Path) -> Capture:
+    """Make a capture whose maps have the errors of a decoder."""
+    rng = np.random.default_rng(seed)
+    return capture(truth, rig, lambda q, _: DecoderNoise().apply(q, truth.size, rng), folder)
 
 
 def write_rig(path: Path, rig: Rig) -> None:
