@@ -56,7 +56,7 @@ def make_view(scene: "MeshScene", placement: Placement) -> View:
 
 def _flags(points: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.uint8]:
     hit = np.isfinite(points[..., 2])
-    step = _largest_step(q) * SUPERSAMPLE
+    step = largest_step(q) * SUPERSAMPLE
     flags = np.zeros([n // SUPERSAMPLE for n in hit.shape], np.uint8)
     flags[_any(step > MIXED)] |= BIT_MIXED
     flags[_any(step > JUMP)] |= BIT_EDGE
@@ -64,7 +64,7 @@ def _flags(points: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.ui
     return flags
 
 
-def _largest_step(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def largest_step(q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest change (H, W) to any of the four neighbours; infinite beside NaN."""
     step = np.zeros(q.shape[:2])
     across = np.nan_to_num(np.abs(np.diff(q, axis=1)).max(-1), nan=np.inf)
