@@ -6,7 +6,6 @@ from typing import Any
 
 from ..errors import InputError
 from ..files import atomic_path
-from ..records.solution import Solution
 from . import contents
 from .digests import array_digest, file_digest, text_digest
 from .sample import Sample
@@ -54,9 +53,12 @@ class ShardStore:
         with atomic_path(self._staged(sample.index)) as aside, hdf5().File(aside, "w") as file:
             group = file.create_group(_name(sample.index))
             for name, array in arrays.items():
-                # One chunk an array: a sample is read as a whole.
-                group.create_dataset(name, data=array, chunks=array.shape, compression="lzf",
-                                     shuffle=True)  # fmt: skip
+                # One chunk an array: a sample is read as a whole. Not the faster lzf, whose output
+                # depends on what its memory held before.
+                group.create_dataset(
+                    name, data=array, chunks=array.shape, compression="gzip", compression_opts=1,
+                    shuffle=True,
+                )  # fmt: skip
             group[TRUTH] = sample.truth.model_dump_json(by_alias=True)
             sums = {name: array_digest(array) for name, array in arrays.items()}
             sums[TRUTH] = text_digest(group[TRUTH].asstr()[()])
@@ -84,13 +86,6 @@ class ShardStore:
             raise InputError(
                 f"has no readable sample {index}", str(path), "make it again"
             ) from None
-
-    def read_truth(self, index: int) -> Solution:
-        """Return a sample's exact calibration."""
-        staged = self._staged(index)
-        path = staged if staged.exists() else self._shard(index // self._per_shard)
-        with hdf5().File(path, "r") as file:
-            return Solution.model_validate_json(file[_name(index)][TRUTH].asstr()[()])
 
     def settle(self, settled: set[int], last: bool) -> None:
         """Seal the shards of which all samples are settled, or all if none follows."""

@@ -152,3 +152,18 @@ def test_a_polyps_truth_lies_on_its_surface():
     top = truth.base + truth.height * truth.normal
     met = scene.cast(top + 2 * truth.normal, -truth.normal[None])
     assert met.points[0] == pytest.approx(top, abs=0.05)
+
+
+@pytest.mark.usefixtures("llvm")
+def test_normals_at_a_crease_are_those_of_the_faces():
+    """Oracle: two planes that share the vertices of their edge, at right angles."""
+    vertices = np.array([[0.0, -60, 70], [0, 60, 70], [-70, 60, 0], [-70, -60, 0], [60, 60, 10],
+                         [60, -60, 10]])  # fmt: skip
+    mesh = Mesh(vertices, np.array([[3, 2, 0], [0, 2, 1], [0, 1, 5], [5, 1, 4]]))
+    maps = maps_of(mesh, RigidTransform.identity())
+    left, right = np.array([1.0, 0, -1]) / np.sqrt(2), np.array([-1.0, 0, -1]) / np.sqrt(2)
+    nearest = np.minimum(np.abs(maps.normals - left).max(-1), np.abs(maps.normals - right).max(-1))
+    assert maps.camera.all()
+    assert nearest.max() < 1e-6
+    assert (maps.normals[:, 0] @ left > 0.99).all()
+    assert (maps.normals[:, -1] @ right > 0.99).all()
