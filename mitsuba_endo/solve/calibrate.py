@@ -10,13 +10,13 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
-from .assemble import assemble
 from .fit import Fit
 from .history import History
-from .law_evidence import choose_law
+from .optimise.run import Progress
 from .options import Options
 from .pipeline import Job, solve
-from .run import Progress
+from .results.assemble import assemble
+from .results.law_evidence import choose_law
 
 
 def calibrate(

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from ..records.calibration import Snapshot
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut
-from .observability import Direction
-from .optimum import Optimum
-from .problem import Problem
-from .state import State
-from .uncertainty import Uncertainty
+from .cost.problem import Problem
+from .optimise.optimum import Optimum
+from .statistics.observability import Direction
+from .statistics.uncertainty import Uncertainty
+from .unknowns.state import State
 
 
 @dataclass(frozen=True, eq=False)

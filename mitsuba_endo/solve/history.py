@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from ..records.calibration import Snapshot, TraceRow
 from ..records.history import Observe
-from .lattice import Lattice
-from .problem import Problem
-from .run import OnIteration
-from .state import INTRINSICS, State
+from .cost.problem import Problem
+from .optimise.run import OnIteration
+from .unknowns.lattice import Lattice
+from .unknowns.state import INTRINSICS, State
 
 VERTICES = 2500
 """Of all surfaces of a snapshot together."""

@@ -13,24 +13,30 @@ from ..records.rig import Rig
 from ..records.solution import LeftOut, Outcome
 from ..start.registration import RangeImage, Registration, register_frames
 from ..start.result import Start
-from .agreement import agreements, worst
-from .drift import drift_prior
+from .cost.drift import drift_prior
+from .cost.problem import Problem
 from .fit import Fit
-from .foresight import foreseen_directions
-from .frames import common_start, solve_alone, usable_starts, without_faults, without_repeats
 from .history import History
-from .joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
-from .observability import Direction
-from .optimum import Optimum
+from .optimise.optimum import Optimum
+from .optimise.polish import smooth_surfaces
+from .optimise.run import OnIteration, Progress, optimise
 from .options import Options
-from .plan import make_plan
-from .polish import smooth_surfaces
-from .problem import Problem
-from .resume import resumed_maps, resumed_problem
-from .run import OnIteration, Progress, optimise
-from .single import separate_surfaces
-from .state import State
-from .uncertainty import uncertainty
+from .prepare.agreement import agreements, worst
+from .prepare.frames import (
+    common_start,
+    solve_alone,
+    usable_starts,
+    without_faults,
+    without_repeats,
+)
+from .prepare.joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
+from .prepare.resume import resumed_maps, resumed_problem
+from .prepare.single import separate_surfaces
+from .statistics.foresight import foreseen_directions
+from .statistics.observability import Direction
+from .statistics.uncertainty import uncertainty
+from .unknowns.plan import make_plan
+from .unknowns.state import State
 
 _MAX_EXTENSIONS = 10
 """Times that the surface may grow while cameras that started at one place spread."""

@@ -8,15 +8,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mitsuba_endo.records.calibration import TraceRow
-from mitsuba_endo.solve.frames import start_frame
-from mitsuba_endo.solve.objective import Objective, evaluate
-from mitsuba_endo.solve.optimum import Optimum
+from mitsuba_endo.solve.cost.objective import Objective, evaluate
+from mitsuba_endo.solve.cost.problem import Problem
+from mitsuba_endo.solve.optimise.optimum import Optimum
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.problem import Problem
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.single import separate_surfaces
-from mitsuba_endo.solve.state import State
+from mitsuba_endo.solve.prepare.frames import start_frame
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.unknowns.plan import make_plan
+from mitsuba_endo.solve.unknowns.state import State
 
 from .report import Figure, timed
 from .scene import PLANE_MM, Scene, make_scene

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_endo.solve.normal import NormalEquations
-from mitsuba_endo.solve.objective import evaluate
+from mitsuba_endo.solve.cost.normal import NormalEquations
+from mitsuba_endo.solve.cost.objective import evaluate
+from mitsuba_endo.solve.cost.problem import Problem
+from mitsuba_endo.solve.optimise.polish import smooth_surfaces
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.polish import smooth_surfaces
-from mitsuba_endo.solve.problem import Problem
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.state import State
-from mitsuba_endo.solve.uncertainty import uncertainty
+from mitsuba_endo.solve.statistics.uncertainty import uncertainty
+from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import Rig, bumpy_sheet, lopsided_camera, random_rig, with_noise, with_outliers
 from tests.solve.problems import NOISE, errors, problem_of, small_rig
 

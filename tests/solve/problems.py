@@ -11,13 +11,13 @@ from mitsuba_endo.geometry.transforms import RigidTransform, tangent_basis
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.rig import Rig as RigFile
-from mitsuba_endo.solve.optimum import Optimum
+from mitsuba_endo.solve.cost.problem import Problem
+from mitsuba_endo.solve.optimise.optimum import Optimum
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import Plan, make_plan
-from mitsuba_endo.solve.problem import Problem
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.single import separate_surfaces
-from mitsuba_endo.solve.state import INTRINSICS, State, intrinsics_vector
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.unknowns.plan import Plan, make_plan
+from mitsuba_endo.solve.unknowns.state import INTRINSICS, State, intrinsics_vector
 from mitsuba_endo.start.known import known_start
 from mitsuba_endo.start.result import Start
 from tests.rigs import Rig, Surface, bumpy_sheet, cast, lopsided_camera

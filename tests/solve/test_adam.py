@@ -8,14 +8,14 @@ import pytest
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.solve.adam import Moments, gradient
-from mitsuba_endo.solve.frames import start_frame
-from mitsuba_endo.solve.objective import Objective, evaluate
+from mitsuba_endo.solve.cost.objective import Objective, evaluate
+from mitsuba_endo.solve.optimise.adam import Moments, gradient
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.single import separate_surfaces
-from mitsuba_endo.solve.stepping import apply_step
+from mitsuba_endo.solve.prepare.frames import start_frame
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.unknowns.plan import make_plan
+from mitsuba_endo.solve.unknowns.stepping import apply_step
 from tests import rigs
 
 OPTIONS = Options()

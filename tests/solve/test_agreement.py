@@ -8,11 +8,11 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector, tangent_basis
 from mitsuba_endo.records.rig import Sharing
-from mitsuba_endo.solve.agreement import Agreement, chance, worst
-from mitsuba_endo.solve.joint import FrameStart
-from mitsuba_endo.solve.optimum import Optimum
-from mitsuba_endo.solve.plan import Plan
-from mitsuba_endo.solve.state import State
+from mitsuba_endo.solve.optimise.optimum import Optimum
+from mitsuba_endo.solve.prepare.agreement import Agreement, chance, worst
+from mitsuba_endo.solve.prepare.joint import FrameStart
+from mitsuba_endo.solve.unknowns.plan import Plan
+from mitsuba_endo.solve.unknowns.state import State
 
 RIGHT = Agreement("right", 0.9, 1.03, 0.01)
 FOLDS = Agreement("folds", 1.0, 1.2, 0.2)

@@ -8,11 +8,11 @@ import pytest
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.rig import Rig
-from mitsuba_endo.solve.drift import drift_prior, step_between
-from mitsuba_endo.solve.objective import GlobalTerm
-from mitsuba_endo.solve.plan import Plan, make_plan
-from mitsuba_endo.solve.state import INTRINSICS, State
-from mitsuba_endo.solve.stepping import apply_step
+from mitsuba_endo.solve.cost.drift import drift_prior, step_between
+from mitsuba_endo.solve.cost.objective import GlobalTerm
+from mitsuba_endo.solve.unknowns.plan import Plan, make_plan
+from mitsuba_endo.solve.unknowns.state import INTRINSICS, State
+from mitsuba_endo.solve.unknowns.stepping import apply_step
 
 BASELINE = 6.0
 DRIFT = {"insertion_mm": 0.4, "lateral_mm": 0.1, "roll_deg": 1.5, "tilt_deg": 0.3}

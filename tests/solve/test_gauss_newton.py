@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.solve.gauss_newton import GaussNewton
-from mitsuba_endo.solve.objective import Objective
-from mitsuba_endo.solve.optimum import Optimum
+from mitsuba_endo.solve.cost.objective import Objective
+from mitsuba_endo.solve.optimise.gauss_newton import GaussNewton
+from mitsuba_endo.solve.optimise.optimum import Optimum
+from mitsuba_endo.solve.optimise.polish import smooth_surfaces
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.polish import smooth_surfaces
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.single import separate_surfaces
-from mitsuba_endo.solve.uncertainty import uncertainty
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.statistics.uncertainty import uncertainty
+from mitsuba_endo.solve.unknowns.plan import make_plan
 from mitsuba_endo.start.plane import plane_start
 from mitsuba_endo.start.search import search_start
 from tests.rigs import Rig, with_noise, with_outliers

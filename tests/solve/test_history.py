@@ -6,8 +6,8 @@ import pytest
 from mitsuba_endo.records.calibration import Snapshot
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.history import coarsened
-from mitsuba_endo.solve.lattice import lattice_over
-from mitsuba_endo.solve.uncertainty import shared_modes
+from mitsuba_endo.solve.statistics.uncertainty import shared_modes
+from mitsuba_endo.solve.unknowns.lattice import lattice_over
 from tests.rigs import with_noise
 from tests.solve.monte_carlo import FIELD
 from tests.solve.problems import NOISE, map_of, rig_file, small_rig

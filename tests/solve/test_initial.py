@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.initial import (
+from mitsuba_endo.solve.prepare.initial import (
     MAX_VERTICES,
     PER_VERTEX,
     cell_size,
@@ -12,7 +12,7 @@ from mitsuba_endo.solve.initial import (
     pixel_angle,
     smooth_samples,
 )
-from mitsuba_endo.solve.lattice import lattice_over
+from mitsuba_endo.solve.unknowns.lattice import lattice_over
 from tests.rigs import lopsided_camera
 from tests.solve.problems import SHEET, small_rig
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_endo.solve import uncertainty
-from mitsuba_endo.solve.normal import NormalEquations
-from mitsuba_endo.solve.optimum import Optimum
+from mitsuba_endo.solve.cost.normal import NormalEquations
+from mitsuba_endo.solve.optimise.optimum import Optimum
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.pipeline import Job, solve
+from mitsuba_endo.solve.statistics import uncertainty
 from tests.solve.views import Views
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.lattice import (
+from mitsuba_endo.solve.unknowns.lattice import (
     Lattice,
     equidistant_coordinates,
     equidistant_direction,

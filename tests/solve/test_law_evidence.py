@@ -11,9 +11,9 @@ from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.fit import Fit
-from mitsuba_endo.solve.law_evidence import choose_law
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.pipeline import Job, solve
+from mitsuba_endo.solve.results.law_evidence import choose_law
 from tests.range_scenes import height_field
 from tests.solve.views import POSE, Views, look, projector_poses, relief_surface, steps
 

@@ -7,10 +7,10 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.distortion import BrownDistortion
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.lattice import lattice_over
-from mitsuba_endo.solve.linearise import FrameRenderer, SurfaceScene
-from mitsuba_endo.solve.plan import SIZES
-from mitsuba_endo.solve.state import INTRINSICS, State, intrinsics_vector
+from mitsuba_endo.solve.cost.linearise import FrameRenderer, SurfaceScene
+from mitsuba_endo.solve.unknowns.lattice import lattice_over
+from mitsuba_endo.solve.unknowns.plan import SIZES
+from mitsuba_endo.solve.unknowns.state import INTRINSICS, State, intrinsics_vector
 from tests.rigs import Surface, lopsided_camera, lopsided_fisheye, plane, sphere
 from tests.solve.problems import LAWS, POSE, SHEET
 

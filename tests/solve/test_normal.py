@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.normal import NormalEquations
-from mitsuba_endo.solve.objective import Objective, evaluate
+from mitsuba_endo.solve.cost.normal import NormalEquations
+from mitsuba_endo.solve.cost.objective import Objective, evaluate
+from mitsuba_endo.solve.cost.problem import Problem
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.problem import Problem
-from mitsuba_endo.solve.single import separate_surfaces
-from mitsuba_endo.solve.state import State
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.unknowns.plan import make_plan
+from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import bumpy_sheet, with_noise, with_outliers
 from tests.solve.problems import map_of, rig_file, small_rig, true_start
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.adam import gradient
-from mitsuba_endo.solve.objective import Objective, estimate_noise, evaluate
-from mitsuba_endo.solve.problem import Problem
-from mitsuba_endo.solve.state import State
-from mitsuba_endo.solve.stepping import apply_step
+from mitsuba_endo.solve.cost.objective import Objective, estimate_noise, evaluate
+from mitsuba_endo.solve.cost.problem import Problem
+from mitsuba_endo.solve.optimise.adam import gradient
+from mitsuba_endo.solve.unknowns.state import State
+from mitsuba_endo.solve.unknowns.stepping import apply_step
 from tests.rigs import with_noise, with_outliers
 from tests.solve.problems import LAWS, problem_of, small_rig
 from tests.solve.test_normal import problem as two_frames

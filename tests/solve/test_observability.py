@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.observability import (
+from mitsuba_endo.solve.statistics.observability import (
     advice,
     correlation,
     free_directions,
@@ -12,8 +12,8 @@ from mitsuba_endo.solve.observability import (
     status_of,
     unknowns,
 )
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.state import State, intrinsics_vector
+from mitsuba_endo.solve.unknowns.plan import make_plan
+from mitsuba_endo.solve.unknowns.state import State, intrinsics_vector
 from tests.solve.problems import POSE, rig_file, small_rig
 
 RIG = small_rig("pinhole")

@@ -7,9 +7,9 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.plan import Plan, make_plan
-from mitsuba_endo.solve.state import State
-from mitsuba_endo.solve.stepping import apply_step
+from mitsuba_endo.solve.unknowns.plan import Plan, make_plan
+from mitsuba_endo.solve.unknowns.state import State
+from mitsuba_endo.solve.unknowns.stepping import apply_step
 from tests.solve.problems import POSE, rig_file, small_rig
 
 RIG = small_rig("pinhole")

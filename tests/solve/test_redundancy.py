@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.solve.redundancy import Look, alike, image_motion, redundancy_warnings
+from mitsuba_endo.solve.results.redundancy import Look, alike, image_motion, redundancy_warnings
 from tests.rigs import lopsided_camera
 
 CAMERA = lopsided_camera(108, 84)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.robust import LOSSES
+from mitsuba_endo.solve.cost.robust import LOSSES
 
 
 @pytest.mark.parametrize("name", LOSSES)

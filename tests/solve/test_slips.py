@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mitsuba_endo.solve.slips import count_slips
+from mitsuba_endo.solve.results.slips import count_slips
 
 
 def test_counts_what_was_put_in():

@@ -9,10 +9,10 @@ import pytest
 
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.calibrate import calibrate
+from mitsuba_endo.solve.optimise.run import optimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.plan import make_plan
-from mitsuba_endo.solve.run import optimise
-from mitsuba_endo.solve.single import separate_surfaces
+from mitsuba_endo.solve.prepare.single import separate_surfaces
+from mitsuba_endo.solve.unknowns.plan import make_plan
 from mitsuba_endo.start.known import known_start
 from mitsuba_endo.start.search import search_start
 from tests.rigs import Rig, Surface, plane, with_noise

@@ -1,0 +1,1 @@
+"""What is minimised: the robust cost, its derivatives and its normal equations."""

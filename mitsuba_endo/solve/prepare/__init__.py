@@ -1,0 +1,1 @@
+"""From starts of the frames to problems, and which frames belong together."""

@@ -1,0 +1,1 @@
+"""What the data tell about the unknowns, and what they cannot."""

@@ -1,0 +1,1 @@
+"""What is unknown: the values, which frames share them, and steps of them."""
