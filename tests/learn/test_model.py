@@ -11,6 +11,7 @@ onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
 from mitsuba_endo.decode.grid.heads import CHANNELS  # noqa: E402
+from mitsuba_endo.decode.grid.network import load_network  # noqa: E402
 from mitsuba_endo.learn.export import export_onnx  # noqa: E402
 from mitsuba_endo.learn.model import DecoderNet  # noqa: E402
 
@@ -59,6 +60,17 @@ def test_every_runtime_agrees(network, exported, size):
     net = cv2.dnn.readNetFromONNX(str(exported))
     net.setInput(image)
     np.testing.assert_allclose(net.forward(), expected, atol=2e-5)
+
+
+@pytest.mark.parametrize("size", [(9, 70), (16, 48), (33, 12)])
+def test_small_images(exported, size):
+    """Oracle: ONNX Runtime; OpenCV is wrong where features shrink to one row or column."""
+    image = np.random.default_rng(3).integers(0, 255, size, dtype=np.uint8)
+    pair = [load_network(exported, engine).heads(image) for engine in ("onnxruntime", "opencv")]
+    assert pair[0].phase.shape == (*size, 2)
+    np.testing.assert_allclose(pair[1].confidence, pair[0].confidence, atol=2e-5)
+    away = pair[1].phase - pair[0].phase
+    np.testing.assert_allclose(away - np.round(away), 0, atol=1e-3)
 
 
 def test_opencv_changes_size_between_images(network, exported):

@@ -19,6 +19,8 @@ from .onnx_metadata import metadata
 
 STRIDE = 16
 """Height and width of the network's input are multiples of it."""
+LEAST = 32
+"""Least height and width: OpenCV 5.0 convolves features of one row or column to rubbish."""
 Engine = Literal["onnxruntime", "opencv"]
 
 
@@ -54,7 +56,7 @@ class Network:
         """
         x = normalise(image)
         height, width = x.shape[1:]
-        below, beside = -height % STRIDE, -width % STRIDE
+        below, beside = (max(-n % STRIDE, LEAST - n) for n in (height, width))
         padded = np.pad(x, ((0, 0), (0, below), (0, beside)), mode="edge")
         output = self._run(np.ascontiguousarray(padded[None]))
         expected = (1, len(self._channels), *padded.shape[1:])
