@@ -8,16 +8,18 @@ from numpy.typing import NDArray
 from .graph import GridGraph, components
 from .links import Links
 from .potts import cut
-from .vote import Placement, evidence, scores_at, vote
+from .vote import Placement, Vote, evidence, scores_at, vote
 from .windows import candidates
 
 MIN_NODES = 9
 """Of a part that is placed."""
 MIN_SCORE = 0.3
 """Mean evidence of a placed part's nodes, if all of it is less than SURE."""
-SURE = 20.0
-"""Evidence that chance does not give: a placement has evidence s by chance with probability
-exp(-s) at most (Markov's inequality for likelihood ratios), and there are some 6,000 of them."""
+SURE = 12.0
+"""Evidence, and margin, that chance hardly gives: one placement has evidence s by chance with
+probability exp(-s) at most (Markov's inequality for likelihood ratios), of some 6,000."""
+SLIPS = [(dx, dy) for dx in range(-3, 4) for dy in (-1, 0, 1)]
+"""Columns and rows by which the other side of a fold is often off."""
 MIN_MARGIN = 6.0
 """Evidence of a placed part over its next best placement."""
 MIN_SHARE = 0.4
@@ -86,7 +88,8 @@ def _parts(
     """Cut a component where two placements meet, and vote again within the parts."""
     place, known = graph.place[members], logs[members]
     whole = vote(place, known, pattern)
-    labels = list(dict.fromkeys([whole.best, *candidates(place, known, pattern)]))
+    found = [whole.best, *candidates(place, known, pattern)]
+    labels = list(dict.fromkeys([*found, *(whole.best.shifted(*slip) for slip in SLIPS)]))
     cost = np.stack([-scores_at(label, place, known, pattern) for label in labels], -1)
     # The last label stands for "none of them", at the evidence of chance.
     cost = np.concatenate([cost, np.zeros((len(members), 1))], axis=1)
@@ -98,15 +101,20 @@ def _parts(
     )
     number = components(same, len(members))
     component = int(graph.component[members[0]])
-    found = []
+    parts = []
     for part in np.unique(number[number >= 0]):
         inside = np.flatnonzero(number == part)
         if len(inside) < MIN_NODES:
             continue
         again = vote(place[inside], known[inside], pattern)
-        if again.score >= min(MIN_SCORE * len(inside), SURE) and again.margin >= MIN_MARGIN:
-            found.append(_Part(members[inside], again.best, again.score, component))
-    return found
+        if _convincing(again, len(inside)):
+            parts.append(_Part(members[inside], again.best, again.score, component))
+    return parts
+
+
+def _convincing(found: Vote, nodes: int) -> bool:
+    well_read = found.score >= MIN_SCORE * nodes and found.margin >= MIN_MARGIN
+    return well_read or min(found.score, found.margin) >= SURE
 
 
 def _within(links: Links, members: NDArray[np.intp], count: int) -> Links:

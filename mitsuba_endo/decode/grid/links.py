@@ -14,7 +14,7 @@ NEAR = 0.35
 """Periods by which a neighbour may miss its predicted place."""
 MAX_TURN_ERROR = 0.2
 """Periods by which the phase's integral along a link may miss its due."""
-MAX_EDGE = 0.5
+MAX_EDGE = 0.8
 MIN_CONFIDENCE = 0.3
 """Mean along a link: lower than a node's, because a highlight may lie on it."""
 SAMPLES = 13

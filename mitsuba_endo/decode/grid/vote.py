@@ -23,6 +23,10 @@ class Placement:
     column: int
     row: int
 
+    def shifted(self, columns: int, rows: int) -> "Placement":
+        """Return the placement so many columns and rows further."""
+        return Placement(self.turn, self.column + columns, self.row + rows)
+
     def of(self, place: NDArray[np.intp]) -> NDArray[np.intp]:
         """Return column and row (..., 2) in the pattern."""
         return self.turn * place + np.array([self.column, self.row])
