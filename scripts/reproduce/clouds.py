@@ -86,7 +86,13 @@ def clouds_picture(clouds: dict[str, Floats], truth: Truth) -> Figure:
             axis = axes[row, i]
             for under, colour in ((shown["truth"], "0.8"), (points, COLOURS[i % 6])):
                 order = np.argsort(-under[:, towards]) if row == 0 else np.arange(len(under))
-                axis.plot(*under[order][:, [0, across]].T, ",", color=colour, alpha=0.6)
+                axis.plot(
+                    *under[order][:, [0, across]].T,
+                    ".",
+                    color=colour,
+                    markersize=1.2,
+                    markeredgewidth=0,
+                )
             axis.set_aspect("equal")
         axes[0, i].set_title(name)
         axes[1, i].set_xlabel("x (mm)")
