@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .beside import vote_beside
 from .graph import GridGraph, components
 from .links import Links
 from .potts import cut
@@ -76,6 +77,7 @@ def identify(graph: GridGraph, pattern: NDArray[np.int8]) -> Identity:
             found = _parts(graph, members, logs, pattern)
             parts += _accepted(found, MIN_SHARE * len(members))
     parts = _accepted(_same_way_up(parts), MIN_SHARE_OF_ALL * tried)
+    parts += _beside(graph, parts, logs, pattern)
     return _without_doubles(graph, parts, logs, pattern)
 
 
@@ -131,6 +133,25 @@ def _accepted(parts: list[_Part], needed: float) -> list[_Part]:
     placed = [len(part.members) for part in parts]
     enough = sum(placed) >= needed or max(placed, default=0) >= LARGE_PART
     return parts if enough else []
+
+
+def _beside(
+    graph: GridGraph, parts: list[_Part], logs: NDArray[np.float64], pattern: NDArray[np.int8]
+) -> list[_Part]:
+    """Place components that are too small or too badly read to be placed alone."""
+    if not parts:
+        return []
+    placed = np.concatenate([part.members for part in parts])
+    known = np.concatenate([part.placement.of(graph.place[part.members]) for part in parts])
+    turn, done = parts[0].placement.turn, {part.component for part in parts}
+    found = []
+    for number in set(graph.component[graph.component >= 0].tolist()) - done:
+        members = np.flatnonzero(graph.component == number)
+        again = vote_beside(members, placed, known, graph.nodes, graph.place, logs, pattern, turn,
+                           SLIPS)  # fmt: skip
+        if again is not None:
+            found.append(_Part(members, again.best, again.score, number))
+    return found
 
 
 def _same_way_up(parts: list[_Part]) -> list[_Part]:
