@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated
 
 import cv2
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 import typer
 
 from mitsuba_endo.learn.cache import CacheSettings, open_cache

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 import numpy as np
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
-from torch import Tensor
-from torch.utils.data import Dataset
+from torch import Tensor  # pyright: ignore[reportMissingImports]
+from torch.utils.data import Dataset  # pyright: ignore[reportMissingImports]
 
 from ..capture.effects import apply_effects
 from ..decode.normalise import normalise

@@ -5,8 +5,8 @@ import warnings
 from pathlib import Path
 
 import onnx  # pyright: ignore[reportMissingImports]
-import torch
-from torch import nn
+import torch  # pyright: ignore[reportMissingImports]
+from torch import nn  # pyright: ignore[reportMissingImports]
 
 from ..decode.grid.heads import CHANNELS
 from ..decode.grid.network import STRIDE

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
-from torch.utils.data import DataLoader
+from torch.utils.data import DataLoader  # pyright: ignore[reportMissingImports]
 
 from ..errors import InputError
 from ..files import atomic_path

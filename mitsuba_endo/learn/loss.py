@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-import torch
-from torch import Tensor
-from torch.nn.functional import (
+import torch  # pyright: ignore[reportMissingImports]
+from torch import Tensor  # pyright: ignore[reportMissingImports]
+from torch.nn.functional import (  # pyright: ignore[reportMissingImports]
     binary_cross_entropy_with_logits,
     cross_entropy,
     normalize,

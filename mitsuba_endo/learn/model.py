@@ -2,8 +2,8 @@
 
 from itertools import pairwise
 
-import torch
-from torch import Tensor, nn
+import torch  # pyright: ignore[reportMissingImports]
+from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
 from ..decode.grid.heads import CHANNELS
 from ..decode.normalise import INPUT_CHANNELS
