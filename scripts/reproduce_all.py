@@ -26,10 +26,11 @@ def main(
     page: Annotated[Path, typer.Option(help="Page to write.")] = OUT / "results.md",
     quick: Quick = False,
     only: Annotated[list[str] | None, typer.Option(help="Run these alone.")] = None,
+    collect: Annotated[bool, typer.Option(help="Run nothing: write the page again.")] = False,
 ) -> None:
     """Run them; an experiment that fails leaves its older output and ends the run with code 1."""
     here, failed = Path(__file__).parent, []
-    for name in only or EXPERIMENTS:
+    for name in () if collect else only or EXPERIMENTS:
         began = perf_counter()
         script = here / f"reproduce_{name}.py"
         command = [sys.executable, str(script), "--out", str(out / name)]
