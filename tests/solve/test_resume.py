@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from mitsuba_endo import backend
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
@@ -30,6 +31,7 @@ SHARES = {
 @pytest.fixture(scope="module", params=SHARES)
 def case(request: pytest.FixtureRequest) -> tuple[Views, Rig, Calibration]:
     """Views, a rig, and the calibration in one go."""
+    backend.ensure()  # fixtures of a module come before those of a function
     own = request.param == "one surface"
     views = look(relief_surface(), steps(2), projector_poses(2) if own else [POSE] * 2)
     rig = views.rig(share=SHARES[request.param])
