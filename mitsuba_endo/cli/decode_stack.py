@@ -26,6 +26,12 @@ Out = Annotated[Path, typer.Option("--out", help="Map to write, .exr or .npz.")]
 MinContrast = Annotated[
     float, typer.Option(min=0, max=1, help="Contrast of a lit pixel, of full scale.")
 ]
+Gamma = Annotated[
+    float,
+    typer.Option(
+        min=0.1, max=5, help="Images hold brightness^(1/gamma): 2.2 for most photographs."
+    ),
+]
 
 
 def decode_stack(
@@ -40,6 +46,7 @@ def decode_stack(
     periods: Periods = None,
     steps: Steps = None,
     min_contrast: MinContrast = 0.03,
+    gamma: Gamma = 1.0,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -58,7 +65,7 @@ def decode_stack(
         plan = make_plan(kind, width, height, inverse, reference, stripe, periods, steps)
         paths = stack_paths(images)
         check_names(paths, plan)
-        result = decode(load_stack(paths), plan, min_contrast=min_contrast)
+        result = decode(load_stack(paths, gamma), plan, min_contrast=min_contrast)
         save_map(out, result.q)
         lit, decoded = float(result.lit.mean()), float(result.decoded.mean())
         output.print(

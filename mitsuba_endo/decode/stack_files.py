@@ -81,9 +81,10 @@ def _abridged(labels: Sequence[str]) -> str:
     return ", ".join(shown)
 
 
-def load_stack(paths: Sequence[str | Path]) -> Stack:
-    """Read 8- or 16-bit images, colour or gray, of linear brightness.
+def load_stack(paths: Sequence[str | Path], gamma: float = 1.0) -> Stack:
+    """Read 8- or 16-bit images, colour or gray, of linear brightness to the power 1 / ``gamma``.
 
+    Phases need linear brightness: gamma 2.2 unnoticed shifts them by some hundredths of a period.
     Full scale of 16-bit files is the smallest of 10, 12, 14 and 16 bits that holds them all.
 
     Raises:
@@ -104,7 +105,9 @@ def load_stack(paths: Sequence[str | Path]) -> Stack:
             )
     levels = full_scale(*raw)
     return Stack(
-        images=np.stack([image.mean(-1, dtype=np.float32) / levels for image in raw]),
+        images=np.stack(
+            [(image / np.float32(levels)).mean(-1, dtype=np.float32) ** gamma for image in raw]
+        ),
         saturated=np.stack([(image >= levels).any(-1) for image in raw]),
         levels=levels,
     )

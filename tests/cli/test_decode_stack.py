@@ -76,6 +76,23 @@ def test_colour_and_16_bits(projected: Path):
     np.testing.assert_array_equal(load_map(projected.parent / "map.exr").q, expected)
 
 
+def test_gamma(tmp_path: Path):
+    """Oracle: own pixels, from images encoded as a photograph's are; unnoticed it must hurt."""
+    options, folder = ("--periods", "70,22,9", "--steps", 3), tmp_path / "stack"
+    assert run("patterns", "--kind", "phase", *SIZE, "--out", folder, *options).exit_code == 0
+    for path in folder.glob("*.png"):
+        light = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) / 255
+        cv2.imwrite(str(path), np.rint(65535 * light ** (1 / 2.2)).astype(np.uint16))
+    y, x = np.mgrid[:44, :61]
+    errors = []
+    for gamma in (2.2, 1.0):
+        result = _decode(folder, *options, "--gamma", gamma, kind="phase")
+        assert result.exit_code == 0, result.stderr
+        found = load_map(tmp_path / "map.exr")
+        errors.append(np.abs(found.q - np.stack([x, y], -1))[found.valid].max())
+    assert errors[0] < 0.1 < errors[1]
+
+
 def _fail(result, code: int, *expected: str) -> None:
     assert result.exit_code == code, result.stderr
     assert len(result.stderr.splitlines()) == 1
