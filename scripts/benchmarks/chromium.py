@@ -118,7 +118,7 @@ def browser(width: int = 1200, height: int = 800) -> Iterator[Page]:
     Raises:
         RuntimeError: no Chromium is installed, or it does not start.
     """
-    from websockets.sync.client import connect
+    from websockets.sync.client import connect  # pyright: ignore[reportMissingImports]
 
     if EXECUTABLE is None:
         raise RuntimeError("no Chromium is installed")

@@ -26,7 +26,7 @@ def chart_data(history: Sequence[Snapshot], marked: int | None) -> Data:
 
 def add_cost_chart(server: Any, history: Sequence[Snapshot]) -> Any:
     """Add the chart to the panel, with a note of what it shows."""
-    from viser import uplot
+    from viser import uplot  # pyright: ignore[reportMissingImports]
 
     line = uplot.Series(label="cost", stroke=CAMERA, width=2, points={"show": True})
     scale = uplot.Series(label="scale", stroke=UNUSED, width=1.5, dash=(5.0, 4.0))

@@ -19,7 +19,7 @@ def running_server(host: str, port: int) -> Iterator[Any]:
         InputError: viser is not installed, or the address cannot be used.
     """
     try:
-        import viser
+        import viser  # pyright: ignore[reportMissingImports]
     except ImportError:
         raise InputError(
             "viser is not installed", "viewer", 'run pip install "mitsuba-endo[view]"'
