@@ -31,9 +31,9 @@ VISUAL, WATER_JET, THRESHOLD = 25.0, 7.4, 10.0
 def solve(inputs: Path, middle: NDArray[np.float64], outline: float) -> PolypSize | None:
     """Calibrate the frame and measure in the circle; None where there is nothing to measure."""
     maps, rig = read_inputs(inputs)
-    found = calibrate(maps, rig)
-    std = found.solution.scale_std_percent
     try:
+        found = calibrate(maps, rig)
+        std = found.solution.scale_std_percent
         return measure_polyp(found.surface, found.camera, middle, outline, std)
     except InputError:
         return None

@@ -18,7 +18,7 @@ from reproduce.capture import Truth
 from reproduce.command import OUT, Out, Quick, Workers
 from reproduce.conditions import CURVES, Condition
 from reproduce.decoder_noise import Plain
-from reproduce.guarded import solvers
+from reproduce.guarded import answer, solvers
 from reproduce.peer_errors import calibration_errors, point_error
 from reproduce.pictures import curves
 from reproduce.tables import save_table
@@ -64,10 +64,9 @@ def main(out: Out = OUT / "robustness", quick: Quick = False, workers: Workers =
 
 
 def _errors(job: Any, truth: Truth, noise: Plain, seed: int) -> tuple[float, float]:
-    """Return both errors; an answer that is refused is infinitely wrong."""
-    try:
-        found = job.result()
-    except (RuntimeError, ValueError):
+    """Return both errors; where a method gives up it is infinitely wrong."""
+    found = answer(job)
+    if found is None:
         return np.inf, np.inf
     return abs(calibration_errors(found, truth)[0]), point_error(found, truth, noise, seed)
 

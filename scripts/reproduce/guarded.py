@@ -4,7 +4,7 @@ import multiprocessing
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
@@ -43,6 +43,19 @@ def solvers(workers: int = 2) -> Iterator[ProcessPoolExecutor]:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_begin) as pool:
         yield pool
+
+
+def answer(job: Future[Result]) -> Result | None:
+    """Return a job's result; None, and a line on the screen, where the method gives up.
+
+    Only what methods say about data (input errors are ValueErrors) is an answer: a truth that was
+    asked for, and mistakes of the program, end the run.
+    """
+    try:
+        return job.result()
+    except (RuntimeError, ValueError) as error:
+        print(f"gave up: {error}", flush=True)
+        return None
 
 
 def solve_each(
