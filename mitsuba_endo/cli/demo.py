@@ -1,5 +1,6 @@
 """``mitsuba-endo demo``: the whole way from a scene to a judged calibration."""
 
+import shutil
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,6 +9,7 @@ import typer
 
 from .calibrate import exit_code, load_input, solve_and_write
 from .console import Debug, Json, Quiet, Session, session
+from .decode import decode_images
 from .evaluate import evaluate_folders
 from .render import capture_scene
 
@@ -19,11 +21,13 @@ Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 
 SCENE = "stomach"
-SETTINGS = {"width": "240", "height": "180", "fx": "170", "cx": "120.4", "cy": "88.6"}
-"""The scene's camera at half its resolution."""
+SETTINGS = {
+    "width": "320", "height": "240", "fx": "226.7", "cx": "160.6", "cy": "118.1",
+    "pattern": "pattern:coded",
+}  # fmt: skip
+"""The scene's camera at two thirds of its resolution, and a pattern that can be decoded."""
 SPP = 32
-NOISE_PX = 0.3
-OUTLIERS = 0.02
+IMAGE = "image.png"
 
 
 def demo(
@@ -33,7 +37,7 @@ def demo(
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Render an endoscope in a stomach, calibrate it from a map alone, compare with the truth."""
+    """Render an endoscope in a stomach, calibrate it from its image, compare with the truth."""
     with session(quiet, as_json, debug) as output:
         from ..files import atomic_folder, check_output_folder
         from ..records.solution import load_solution
@@ -43,7 +47,10 @@ def demo(
         check_output_folder(out)
         with atomic_folder(out) as folder:
             _make_input(folder, seed, output)
-            maps, rig = load_input([folder / "input" / "map.exr"], folder / "input" / "rig.yaml")
+            rig_file, decoded = folder / "input" / "rig.yaml", folder / "decoded"
+            decoded.mkdir()
+            paths = decode_images([folder / "input" / IMAGE], rig_file, None, decoded, output)
+            maps, rig = load_input(paths, rig_file)
             solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
             metrics = evaluate_folders(folder / "solution", folder / "capture" / "truth.json")
             metrics.save(folder / "metrics.json")
@@ -54,19 +61,13 @@ def demo(
 
 def _make_input(folder: Path, seed: int, output: Session) -> None:
     """Write the capture with its truth, and apart from it what a user would have of it."""
-    from ..records.correspondence import load_map, save_map
-    from ..records.known_input import save_rig
-    from ..records.rig import load_rig
-    from ..rendering.decoder_errors import like_decoded
-    from ..show.capture_folder import MAP, RIG, write_capture_folder
+    from ..show.capture_folder import RIG, write_capture_folder
 
     capture, loaded = capture_scene(SCENE, SETTINGS, SPP, seed, output)
     write_capture_folder(folder / "capture", capture, loaded)
-    exact = load_map(folder / "capture" / MAP)
-    rig = load_rig(folder / "capture" / RIG)
-    size = rig.projector.width, rig.projector.height
-    save_map(folder / "input" / "map.exr", like_decoded(exact.q, size, NOISE_PX, OUTLIERS, seed))
-    save_rig(folder / "input" / "rig.yaml", rig)
+    (folder / "input").mkdir()
+    for name in (IMAGE, RIG):
+        shutil.copyfile(folder / "capture" / name, folder / "input" / name)
 
 
 def _report(
@@ -81,16 +82,17 @@ def _report(
 
     output.print(
         f"An endoscope before a stomach wall, {SETTINGS['width']} x {SETTINGS['height']} pixels. "
-        f"Projector coordinates with {NOISE_PX} px noise and {100 * OUTLIERS:.0f} % outliers; "
-        "focal length, pose and surface unknown, the length of the baseline given.",
+        "One image of the coded grid; focal length, pose and surface unknown, the length of the "
+        "baseline given.",
         comparison_table(solution, truth),
         metrics_table(metrics),
         *solution.verdict,
         f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
         f"  {out}/capture/image.png        what the endoscope sees",
+        f"  {out}/decoded/image_graph.png  the grid found in it",
         f"  {out}/solution/report.html     verdict, maps, residuals, surface and rig",
         f"  {out}/solution/solution.json   the result, {out}/metrics.json its errors",
-        f"Again by hand: mitsuba-endo calibrate {out}/input/map.exr "
+        f"Again by hand: mitsuba-endo calibrate {out}/input/{IMAGE} "
         f"--rig {out}/input/rig.yaml --out result",
     )
     output.summary(
