@@ -1,5 +1,7 @@
 """Calibration: from correspondence maps and a rig to projector, poses and surface."""
 
+from dataclasses import replace
+
 from threadpoolctl import threadpool_limits
 
 from ..geometry.laws import LAWS
@@ -15,8 +17,9 @@ from .history import History
 from .optimise.run import Progress
 from .options import Options
 from .pipeline import Job, solve
+from .prepare.resume import checkpoint_of
 from .results.assemble import assemble
-from .results.law_evidence import choose_law
+from .results.law_evidence import better_fit, choose_law
 
 
 def calibrate(
@@ -56,16 +59,42 @@ def calibrate(
     )
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
-        fits: list[Fit] = []
-        for i, law in enumerate(laws):
-            job = Job(maps, camera, rig, law, options, resume, history=History(observe))
-            fits.append(solve(job, _part(say, i, len(laws))))
-            if fits[-1].optimum.outcome is Outcome.INTERRUPTED:
-                fits = fits[-1:]  # the user wants to go on with this one
-                break
+        jobs = [Job(maps, camera, rig, law, options, resume, history=History(observe))
+                for law in laws]  # fmt: skip
+        fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
         return assemble(fit, camera, rig, options, evidence, warnings)
+
+
+def solve_each(jobs: list[Job], say: Progress) -> list[Fit]:
+    """Solve the same maps under each law, and under each from where the others ended too.
+
+    A law is compared at its best: where the data say little, its own start may lie in a valley
+    that leads elsewhere, and another law's solution is a start as good as its own.
+
+    Returns:
+        One fit a law; the interrupted one alone where the user stopped.
+    """
+    fits: list[Fit] = []
+    for i, job in enumerate(jobs):
+        fits.append(solve(job, _part(say, i, len(jobs))))
+        if fits[-1].optimum.outcome is Outcome.INTERRUPTED:
+            return fits[-1:]
+    return [_from_others(job, fit, fits) for job, fit in zip(jobs, fits, strict=True)]
+
+
+def _from_others(job: Job, own: Fit, fits: list[Fit]) -> Fit:
+    """Return the better of a law's own fit and those that start where the other laws ended."""
+    best = own
+    for other in fits:
+        same_frames = [m.name for m in other.maps] == [m.name for m in own.maps]
+        if other is own or not same_frames:
+            continue
+        start = replace(checkpoint_of(other.optimum), law=job.law, stage=0)
+        again = solve(replace(job, resume=start, history=History()), lambda _share, _step: None)
+        best = better_fit(best, replace(again, left_out=own.left_out, notes=own.notes))
+    return best
 
 
 def _part(say: Progress, index: int, parts: int) -> Progress:

@@ -128,7 +128,7 @@ def test_overview_says_the_essential(calibration: Calibration, view: SurfaceView
     """Oracle: the solution's numbers in the title."""
     figure = figures.overview_figure(calibration, view)
     assert figure.get_suptitle() == (
-        "converged; focal length 900.00 ± 0.42 pattern px; baseline 6.1814 mm (given); "
+        "converged; focal length 900.00 ± 0.82 pattern px (95 %); baseline 6.1814 mm (given); "
         "residual 0.31 px RMS"
     )
     assert len(_images(figure)) == 4

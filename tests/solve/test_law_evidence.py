@@ -9,10 +9,10 @@ from mitsuba_endo.geometry.laws import LAWS
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.solve.calibrate import calibrate
+from mitsuba_endo.solve.calibrate import calibrate, solve_each
 from mitsuba_endo.solve.fit import Fit
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.pipeline import Job, solve
+from mitsuba_endo.solve.pipeline import Job
 from mitsuba_endo.solve.results.law_evidence import choose_law
 from tests.range_scenes import height_field
 from tests.solve.views import POSE, Views, look, projector_poses, relief_surface, steps
@@ -68,7 +68,7 @@ def fits(views: Views, **options: int) -> list[Fit]:
         Job(views.maps, views.camera, views.rig(), law, Options(jackknife=False, **options))
         for law in LAWS
     ]
-    return [solve(job, lambda _share, _step: None) for job in jobs]
+    return solve_each(jobs, lambda _share, _step: None)
 
 
 def ended(fit: Fit, outcome: Outcome, step: float) -> Fit:

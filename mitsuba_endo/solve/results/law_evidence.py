@@ -64,6 +64,13 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     return fits[best], evidence, warning
 
 
+def better_fit(a: Fit, b: Fit) -> Fit:
+    """Return which of two fits of the same frames under one law costs less."""
+    sigma = min(f.optimum.objective.sigma for f in (a, b))
+    totals = [sum(_block_costs(f, sigma).values()) + _prior(f, sigma) for f in (a, b)]
+    return b if totals[1] < totals[0] else a
+
+
 def _may_gain(fit: Fit) -> float:
     """Return the log-likelihood that a fit which has not converged may still gain, about.
 
