@@ -77,6 +77,9 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
     except InputError as error:
         _fail(str(error), error.exit_code, as_json)
     except KeyboardInterrupt:
+        # Caught within exec of a text (libraries build classes so), an interrupt leaves a mark with
+        # which CPython ends by the signal, whatever the exit code; the next exec wipes it off.
+        exec("")
         _fail("interrupted; no output was left half written.", EXIT_INTERRUPTED, as_json)
     except Exception as error:  # the boundary of the program: nothing above us could handle it
         if debug:
