@@ -29,8 +29,8 @@ from mitsuba_endo.solve.calibrate import calibrate
 
 WRONG_FOCAL = 1.1 * FOCAL
 WRONG_POSE = RigidTransform.of([0.015, -0.02, 0.01], [0.3, -0.2, 0.3])
-PLANE = replace(LEAN, start="plane", plane_distance=11.0)
-"""70 mm in baselines."""
+PLANE = replace(LEAN, start="plane", plane_distance=8.0)
+"""50 mm in baselines."""
 
 
 def solve(inputs: Path, frames: slice, plane: bool) -> Calibration:

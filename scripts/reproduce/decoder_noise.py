@@ -133,13 +133,17 @@ def _mixed(q: Floats, steps: Mask, rng: np.random.Generator) -> Floats:
 def _patches(
     places: Mask, share: float, radii: tuple[float, float], rng: np.random.Generator
 ) -> Mask:
-    """Return discs (H, W) centred on some of ``places`` that cover a share of the image."""
+    """Return discs (H, W) centred on some of ``places`` that cover a share of the image.
+
+    Less where a disc on every place does not cover it.
+    """
     height, width = places.shape
     y, x = np.mgrid[:height, :width]
     centres = np.argwhere(places)
     done = np.zeros(places.shape, bool)
-    while len(centres) and done.mean() < share:
-        cy, cx = centres[rng.integers(len(centres))]
+    for cy, cx in centres[rng.permutation(len(centres))]:
+        if done.mean() >= share:
+            break
         a, b = width * rng.uniform(*radii, 2)
         disc = ((x - cx) / a) ** 2 + ((y - cy) / b) ** 2 < 1
         done |= maximum_filter(disc, 2)

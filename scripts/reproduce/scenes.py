@@ -69,7 +69,7 @@ def colon_mesh(seed: int) -> Mesh:
 
 def rabbit_mesh() -> Mesh:
     """Return the rabbit in front of a wall, as on a table: the solver gets no outline."""
-    rabbit, wall = make_shape("rabbit", distance=70.0), make_shape("plane", distance=95.0)
+    rabbit, wall = make_shape("rabbit", distance=50.0), make_shape("plane", distance=70.0)
     return Mesh(
         np.concatenate([rabbit.vertices, wall.vertices]),
         np.concatenate([rabbit.faces, wall.faces + len(rabbit.vertices)]),

@@ -136,3 +136,12 @@ def test_the_page_holds_tables_pictures_and_missed_targets(tmp_path: Path) -> No
     assert "| focal | ratio | 0.5 | at most 0.4 | **no** |" in page
     assert "| focal | share | 0.9 | at least 0.8 | yes |" in page
     assert (tmp_path / "docs" / "images" / "results_focal.png").read_bytes() == b"picture"
+
+
+def test_slips_end_where_few_places_have_room_for_them() -> None:
+    """Oracle: one step of two pixels is all there is; discs on it cover less than the share."""
+    q = smooth_map()[:, :59]
+    q[:, 57:, 0] -= 60
+    q[2:] = np.nan
+    noise = DecoderNoise(slips=0.5, missing=0.0)
+    assert np.isfinite(noise.apply(q, SIZE, np.random.default_rng(1))).any()
