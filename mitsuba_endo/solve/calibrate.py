@@ -16,10 +16,10 @@ from .fit import Fit
 from .history import History
 from .optimise.run import Progress
 from .options import Options
-from .pipeline import Job, solve
+from .pipeline import Found, Job, finish, search
 from .prepare.resume import checkpoint_of
 from .results.assemble import assemble
-from .results.law_evidence import better_fit, choose_law
+from .results.law_evidence import cheaper, choose_law
 
 
 def calibrate(
@@ -76,27 +76,34 @@ def solve_each(jobs: list[Job], say: Progress) -> list[Fit]:
     Returns:
         One fit a law; the interrupted one alone where the user stopped.
     """
-    fits: list[Fit] = []
+    found: list[Found] = []
     for i, job in enumerate(jobs):
-        fits.append(solve(job, _part(say, i, len(jobs))))
-        if fits[-1].optimum.outcome is Outcome.INTERRUPTED:
-            return fits[-1:]
-    return [_from_others(job, fit, fits) for job, fit in zip(jobs, fits, strict=True)]
+        found.append(search(job, _part(say, i, 2 * len(jobs) if len(jobs) > 1 else 1)))
+        if found[-1].optimum.outcome is Outcome.INTERRUPTED:
+            return [finish(job, found[-1], _part(say, 1, 1))]
+    for i, job in enumerate(jobs if len(jobs) > 1 else []):
+        found[i] = _from_others(job, i, found, _part(say, len(jobs) + i, 2 * len(jobs)))
+        if found[i].optimum.outcome is Outcome.INTERRUPTED:
+            return [finish(job, found[i], _part(say, 1, 1))]
+    return [finish(job, f, _part(say, 1, 1)) for job, f in zip(jobs, found, strict=True)]
 
 
-def _from_others(job: Job, own: Fit, fits: list[Fit]) -> Fit:
-    """Return the better of a law's own fit and those that start where the other laws ended."""
-    best = own
-    for other in fits:
-        same_frames = [m.name for m in other.maps] == [m.name for m in own.maps]
-        if other is own or not same_frames:
+def _from_others(job: Job, law: int, found: list[Found], say: Progress) -> Found:
+    """Return the better of where a law ended by itself and from where the other laws ended."""
+    best = own = found[law]
+    for other in (f for k, f in enumerate(found) if k != law):
+        if [m.name for m in other.maps] != [m.name for m in own.maps]:
             continue
         start = replace(checkpoint_of(other.optimum), law=job.law, stage=0)
-        again = solve(replace(job, resume=start, history=History()), lambda _share, _step: None)
-        best = better_fit(best, replace(again, left_out=own.left_out, notes=own.notes))
+        alike = replace(job, resume=start, foreseen=[], history=History())
+        again = search(alike, say).optimum
+        if again.outcome is Outcome.INTERRUPTED:
+            return replace(own, optimum=again)
+        if cheaper(again, best.optimum):
+            best = replace(own, optimum=again)
     return best
 
 
 def _part(say: Progress, index: int, parts: int) -> Progress:
     """Return a progress callback that fills one part of the first nine tenths."""
-    return lambda share, step: say(0.9 * (index + share) / parts, step)
+    return lambda share, step: say(0.9 * min(index + share, parts) / parts, step)

@@ -68,8 +68,19 @@ class Job:
         self.timings[stage] = self.timings.get(stage, 0.0) + time.perf_counter() - began
 
 
-def solve(job: Job, say: Progress) -> Fit:
-    """Solve a job.
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where an optimisation of a job ended."""
+
+    maps: list[CorrespondenceMap]
+    """The frames that are part of it."""
+    left_out: list[LeftOut]
+    notes: list[str]
+    optimum: Optimum
+
+
+def search(job: Job, say: Progress) -> Found:
+    """Search for a start and optimise.
 
     Raises:
         InputError: no frame can be used, or the plan contradicts itself.
@@ -82,7 +93,7 @@ def solve(job: Job, say: Progress) -> Fit:
     return _own_surfaces(job, say)
 
 
-def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Fit:
+def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Found:
     maps = resumed_maps(checkpoint, job.maps)
     plan = make_plan(job.rig, len(maps))
     say(0.1, "Optimising")
@@ -94,10 +105,10 @@ def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Fit:
         for m in job.maps
         if m not in maps
     ]
-    return _finish(job, maps, left_out, [], optimum, say)
+    return Found(maps, left_out, [], optimum)
 
 
-def _own_surfaces(job: Job, say: Progress) -> Fit:
+def _own_surfaces(job: Job, say: Progress) -> Found:
     say(0.05, "Searching for a start")
     with job.timed("start"):
         maps, starts, left_out = _starts(job)
@@ -109,26 +120,10 @@ def _own_surfaces(job: Job, say: Progress) -> Fit:
     with job.timed("optimise"):
         problem, state = separate_surfaces(maps, starts, job.camera, plan, job.law, job.options)
         optimum = _optimise(job, problem, state, _reporter(job, say, 0.4))
-    return _finish(job, maps, left_out, notes, optimum, say)
+    return Found(maps, left_out, notes, optimum)
 
 
-def _shared_surface(job: Job, say: Progress) -> Fit:
-    together = _solve_together(job, say)
-    maps = [m for m in job.maps if m.name in together.names]
-    return _finish(job, maps, together.left_out, together.notes, together.optimum, say)
-
-
-@dataclass(frozen=True, eq=False)
-class _Together:
-    """Frames that agree on one surface."""
-
-    names: list[str]
-    optimum: Optimum
-    left_out: list[LeftOut]
-    notes: list[str]
-
-
-def _solve_together(job: Job, say: Progress) -> _Together:
+def _shared_surface(job: Job, say: Progress) -> Found:
     """Solve every frame alone, register them, and optimise all with one surface."""
     alone, left_out = _solved_alone(job, say)
     say(0.5, "Registering the frames")
@@ -183,7 +178,7 @@ def _named(reason: str, alone: list[FrameStart]) -> str:
 
 def _optimise_joint(
     job: Job, alone: list[FrameStart], placed: list[Registration], say: Progress
-) -> _Together:
+) -> Found:
     """Optimise all frames; leave out one that contradicts the others and try again."""
     left_out: list[LeftOut] = []
     while True:
@@ -198,7 +193,8 @@ def _optimise_joint(
         alone = [a for k, a in enumerate(alone) if k != wrong]
         placed = [p for k, p in enumerate(placed) if k != wrong]
     doubts = [f"do not rely on frame {a.name}: {a.reason}" for a in found if a.doubtful]
-    return _Together([a.name for a in alone], optimum, left_out, doubts)
+    names = {a.name for a in alone}
+    return Found([m for m in job.maps if m.name in names], left_out, doubts, optimum)
 
 
 def _optimise(
@@ -244,19 +240,13 @@ def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
     return report
 
 
-def _finish(
-    job: Job,
-    maps: list[CorrespondenceMap],
-    left_out: list[LeftOut],
-    notes: list[str],
-    optimum: Optimum,
-    say: Progress,
-) -> Fit:
-    say(0.95, "Computing standard deviations")
+def finish(job: Job, found: Found, say: Progress) -> Fit:
+    """Smooth the surface to be reported and tell how well everything is known."""
+    say(0.0, "Computing standard deviations")
     with job.timed("surface"):
-        reported = smooth_surfaces(optimum, job.options)
+        reported = smooth_surfaces(found.optimum, job.options)
     with job.timed("uncertainty"):
-        known = uncertainty(optimum, reported, job.options.jackknife)
+        known = uncertainty(found.optimum, reported, job.options.jackknife)
     given = [m.name for m in job.maps]
-    return Fit(job.law, maps, left_out, given, optimum, reported, known, notes, job.timings,
-               job.foreseen, job.history.snapshots)  # fmt: skip
+    return Fit(job.law, found.maps, found.left_out, given, found.optimum, reported, known,
+               found.notes, job.timings, job.foreseen, job.history.snapshots)  # fmt: skip

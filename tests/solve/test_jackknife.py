@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.solve.cost.normal import NormalEquations
 from mitsuba_endo.solve.optimise.optimum import Optimum
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.pipeline import Job, solve
+from mitsuba_endo.solve.pipeline import Job, search
 from mitsuba_endo.solve.statistics import uncertainty
 from tests.solve.views import Views
 
@@ -16,7 +16,7 @@ from tests.solve.views import Views
 def optimum(llvm: str, three_views: Views) -> Optimum:
     views = three_views
     options = Options(jackknife=False)
-    return solve(
+    return search(
         Job(views.maps, views.camera, views.rig(), "pinhole", options), lambda *_: None
     ).optimum
 

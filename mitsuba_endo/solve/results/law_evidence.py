@@ -7,6 +7,7 @@ import numpy as np
 from ...records.solution import Outcome
 from ..cost.objective import MISSED
 from ..fit import Fit
+from ..optimise.optimum import Optimum
 from ..statistics.uncertainty import image_blocks
 
 MIN_EVIDENCE = 10.0
@@ -28,9 +29,9 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     if len(fits) == 1:
         return fits[0], {}, []
     sigma = min(f.optimum.objective.sigma for f in fits)
-    costs = [_block_costs(f, sigma) for f in fits]
+    costs = [_block_costs(f.optimum, sigma) for f in fits]
     common = sorted(set.intersection(*(set(c) for c in costs)))
-    totals = [sum(c[key] for key in common) + _prior(f, sigma)
+    totals = [sum(c[key] for key in common) + _prior(f.optimum, sigma)
               for c, f in zip(costs, fits, strict=True)]  # fmt: skip
     order = sorted(range(len(fits)), key=lambda i: totals[i])
     best, other = order[0], order[1]
@@ -64,11 +65,11 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     return fits[best], evidence, warning
 
 
-def better_fit(a: Fit, b: Fit) -> Fit:
-    """Return which of two fits of the same frames under one law costs less."""
-    sigma = min(f.optimum.objective.sigma for f in (a, b))
-    totals = [sum(_block_costs(f, sigma).values()) + _prior(f, sigma) for f in (a, b)]
-    return b if totals[1] < totals[0] else a
+def cheaper(a: Optimum, b: Optimum) -> bool:
+    """Tell whether the first of two optima of the same frames under one law costs less."""
+    sigma = min(a.objective.sigma, b.objective.sigma)
+    first, second = (sum(_block_costs(o, sigma).values()) + _prior(o, sigma) for o in (a, b))
+    return first < second
 
 
 def _may_gain(fit: Fit) -> float:
@@ -85,13 +86,13 @@ def _settled(fit: Fit) -> bool:
     return fit.optimum.outcome is Outcome.CONVERGED
 
 
-def _block_costs(fit: Fit, sigma: float) -> dict[tuple[str, int], float]:
+def _block_costs(optimum: Optimum, sigma: float) -> dict[tuple[str, int], float]:
     """Return the cost of every image block in noise variances."""
-    loss = fit.optimum.objective.loss
+    loss = optimum.objective.loss
     scale = loss.efficient_scale * sigma
     out: dict[tuple[str, int], float] = {}
-    for k, frame in enumerate(fit.problem.frames):
-        r2 = fit.optimum.evaluation.squared(k)
+    for k, frame in enumerate(optimum.objective.problem.frames):
+        r2 = optimum.evaluation.squared(k)
         missed = loss(np.array((MISSED * scale) ** 2), scale)
         cost = np.where(np.isfinite(r2), loss(np.nan_to_num(r2), scale), missed)
         block = image_blocks(frame.pixels, frame.shape)
@@ -100,9 +101,9 @@ def _block_costs(fit: Fit, sigma: float) -> dict[tuple[str, int], float]:
     return out
 
 
-def _prior(fit: Fit, sigma: float) -> float:
-    surfaces = fit.optimum.objective.problem.surfaces
+def _prior(optimum: Optimum, sigma: float) -> float:
+    surfaces = optimum.objective.problem.surfaces
     total = sum(
-        s.prior.cost(rho, sigma) for s, rho in zip(surfaces, fit.optimum.state.rho, strict=True)
+        s.prior.cost(rho, sigma) for s, rho in zip(surfaces, optimum.state.rho, strict=True)
     )
     return total / sigma**2
