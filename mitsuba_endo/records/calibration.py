@@ -1,5 +1,6 @@
 """Everything a calibration hands on: the solution and the arrays that belong to it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,7 +92,7 @@ class Calibration:
     solution: Solution
     camera: CameraModel
     surface: SurfaceEstimate
-    frames: list[FrameMaps]
+    frames: Sequence[FrameMaps]
     trace: list[TraceRow] = field(default_factory=list)
     checkpoint: Checkpoint | None = None
     """From which the optimisation can go on."""

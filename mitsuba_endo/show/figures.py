@@ -1,6 +1,7 @@
 """Figures of a calibration: functions from records to matplotlib figures, no global state."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -35,7 +36,9 @@ def save_figure(path: str | Path, figure: Figure) -> None:
         figure.savefig(aside, dpi=DPI, format="png")
 
 
-def coordinates_figure(frames: list[FrameMaps], which: Literal["observed", "rendered"]) -> Figure:
+def coordinates_figure(
+    frames: Sequence[FrameMaps], which: Literal["observed", "rendered"]
+) -> Figure:
     """Draw the maps of projector coordinates, x and y side by side, a pair for every frame.
 
     Observed and rendered maps share their colour scale.
@@ -50,7 +53,7 @@ def coordinates_figure(frames: list[FrameMaps], which: Literal["observed", "rend
     return figure
 
 
-def residual_figure(frames: list[FrameMaps]) -> Figure:
+def residual_figure(frames: Sequence[FrameMaps]) -> Figure:
     """Draw observed - rendered, signed, x and y side by side, a pair for every frame."""
     limit = panels.residual_range(frames)
     figure, axes = _grid(frames)
@@ -62,7 +65,7 @@ def residual_figure(frames: list[FrameMaps]) -> Figure:
 
 
 def histogram_figure(
-    frames: list[FrameMaps], noise_px: float | None = None, scale_px: float | None = None
+    frames: Sequence[FrameMaps], noise_px: float | None = None, scale_px: float | None = None
 ) -> Figure:
     """Draw the distribution of the residuals.
 
@@ -169,11 +172,11 @@ def projector_poses(solution: Solution) -> list[RigidTransform]:
     return [pose for pose in found if pose is not None]
 
 
-def _of(frame: FrameMaps, frames: list[FrameMaps], prefix: str = "") -> str:
+def _of(frame: FrameMaps, frames: Sequence[FrameMaps], prefix: str = "") -> str:
     return f"\n{prefix}{frame.name}" if len(frames) > 1 else ""
 
 
-def _grid(frames: list[FrameMaps]) -> tuple[Figure, Any]:
+def _grid(frames: Sequence[FrameMaps]) -> tuple[Figure, Any]:
     """Return a figure with two panels for every frame, and its axes (frames, 2)."""
     height, width = frames[0].observed.shape[:2]
     pairs = 1 if len(frames) <= 2 else min(_MAX_COLUMNS // 2, len(frames))

@@ -1,5 +1,6 @@
 """What one pair of axes shows; each function draws into axes it is given."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -43,7 +44,7 @@ def coordinate(axes: Axes, q: NDArray[Any], limits: NDArray[Any], title: str) ->
     image_axes(axes, title)
 
 
-def coordinate_limits(frames: list[FrameMaps], channel: int) -> NDArray[np.float64]:
+def coordinate_limits(frames: Sequence[FrameMaps], channel: int) -> NDArray[np.float64]:
     """Return the range of a channel over all frames, without the farthest percent of outliers."""
     values = np.concatenate([f.observed[..., channel][f.used] for f in frames])
     rendered = np.concatenate([f.rendered[..., channel].ravel() for f in frames])
@@ -54,7 +55,7 @@ def coordinate_limits(frames: list[FrameMaps], channel: int) -> NDArray[np.float
     return np.percentile(values.astype(np.float64), [0.5, 99.5])
 
 
-def residual_range(frames: list[FrameMaps]) -> float:
+def residual_range(frames: Sequence[FrameMaps]) -> float:
     """Return the residual, pattern pixels, that 98 % of those used stay within."""
     values = np.concatenate([np.abs(f.residual[f.used]).ravel() for f in frames])
     values = values[np.isfinite(values)]
@@ -81,7 +82,7 @@ def residual(axes: Axes, frame: FrameMaps, channel: int, limit: float, title: st
 
 
 def residual_histogram(
-    axes: Axes, frames: list[FrameMaps], noise_px: float | None, scale_px: float | None
+    axes: Axes, frames: Sequence[FrameMaps], noise_px: float | None, scale_px: float | None
 ) -> None:
     """Draw the distribution of the residuals used, with a normal one and the robust scale."""
     limit = 2.5 * residual_range(frames)

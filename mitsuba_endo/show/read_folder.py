@@ -1,7 +1,9 @@
 """A solution folder back as the calibration that wrote it."""
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,38 @@ USED = "used"
 """Channel of the observed maps: 1 where the solver used the correspondence."""
 
 
+class StoredFrames(Sequence[FrameMaps]):
+    """The frames of a folder, each read when it is first asked for; the viewer wants few of them.
+
+    Raises:
+        InputError: a file is missing; or, when its frame is asked for, damaged.
+    """
+
+    def __init__(self, folder: Path, names: list[str]) -> None:
+        self._files = [
+            (name, folder / rendered, folder / observed)
+            for name, rendered, observed in zip(
+                names, map_names(names), observed_names(names), strict=True
+            )
+        ]
+        self._read: dict[int, FrameMaps] = {}
+        for path in (path for _, *paths in self._files for path in paths):
+            if not path.is_file():
+                raise InputError("no such file", str(path), "calibrate again")
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    def __getitem__(self, index: Any) -> Any:
+        chosen = range(len(self))[index]
+        return self._frame(chosen) if isinstance(chosen, int) else [self._frame(k) for k in chosen]
+
+    def _frame(self, index: int) -> FrameMaps:
+        if index not in self._read:
+            self._read[index] = _frame(*self._files[index])
+        return self._read[index]
+
+
 def save_observed(path: str | Path, frame: FrameMaps) -> None:
     """Write the observed coordinates and which of them were used as OpenEXR."""
     channels = {name: frame.observed[..., i] for i, name in enumerate(CHANNELS)}
@@ -28,7 +62,7 @@ def read_solution_folder(path: str | Path) -> Calibration:
     """Read what pictures, reports and the viewer are made of; the checkpoint stays.
 
     Raises:
-        InputError: a file is missing or damaged.
+        InputError: a file is missing or damaged; maps are read by :class:`StoredFrames`.
     """
     folder = Path(path)
     if folder.name == "solution.json":
@@ -38,12 +72,7 @@ def read_solution_folder(path: str | Path) -> Calibration:
         what = "camera" if solution.camera is None else "surface"
         raise InputError(f"{what} is missing", str(folder / "solution.json"), "calibrate again")
     names = [frame.name for frame in solution.frames]
-    frames = [
-        _frame(folder, name, rendered, observed)
-        for name, rendered, observed in zip(
-            names, map_names(names), observed_names(names), strict=True
-        )
-    ]
+    frames = StoredFrames(folder, names)
     surface = load_with_modes(folder / solution.surface)
     trace = _trace(folder / "trace.csv")
     return Calibration(
@@ -70,10 +99,9 @@ def read_observed(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     return _stacked(seen, path), seen[USED] > 0
 
 
-def _frame(folder: Path, name: str, rendered: str, observed: str) -> FrameMaps:
-    maps = read_exr(folder / rendered)
-    seen, used = read_observed(folder / observed)
-    return FrameMaps(name, seen, _stacked(maps, folder / rendered), used)
+def _frame(name: str, rendered: Path, observed: Path) -> FrameMaps:
+    seen, used = read_observed(observed)
+    return FrameMaps(name, seen, _stacked(read_exr(rendered), rendered), used)
 
 
 def _stacked(channels: dict[str, NDArray[np.float32]], path: Path) -> NDArray[np.float32]:

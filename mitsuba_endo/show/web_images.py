@@ -3,6 +3,7 @@
 import base64
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +54,7 @@ class MapPages:
     residual_scale: Scale
 
 
-def map_pages(frames: list[FrameMaps]) -> MapPages:
+def map_pages(frames: Sequence[FrameMaps]) -> MapPages:
     """Colour the maps of all frames on common scales."""
     limits = [coordinate_limits(frames, c) for c in (0, 1)]
     scales = [banded(float(low), float(high)) for low, high in limits]

@@ -15,6 +15,9 @@ import pytest
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.rig import Camera, Rig
+from mitsuba_endo.show.content import Content
+from mitsuba_endo.show.read_folder import read_solution_folder
+from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.viewer import LiveView, Viewer, address, open_viewer, running_server
 from scripts.benchmarks.chromium import EXECUTABLE, browser
 from tests.show.test_truth import write_truth
@@ -79,6 +82,28 @@ def test_iterations_move_what_is_shown(viewer: Viewer, server: Any, calibration:
         np.testing.assert_allclose(lines[0, 0], -pose.R.T @ pose.t, rtol=1e-5)
     viewer.controls.change(snapshot=None)
     assert "/surface/0" in viewer.stage.nodes.visible
+
+
+def test_frames_are_read_when_their_rays_are_wanted(
+    server: Any, calibration: Calibration, tmp_path: Path
+):
+    """Oracle: the rays of the calibration in memory; a damaged map of another frame is told in the
+    panel with its name, and everything else stays."""
+    write_solution_folder(tmp_path / "out", calibration)
+    damaged = next((tmp_path / "out").glob("observed_01*.exr"))
+    damaged.write_bytes(damaged.read_bytes()[:500])
+    viewer = open_viewer(server, read_solution_folder(tmp_path / "out"))
+    viewer.controls.change(frame=0, rays=True)
+    found, kept = Content(calibration).rays(0), viewer.content.rays(0)
+    assert found is not None
+    assert kept is not None
+    np.testing.assert_allclose(kept.camera, found.camera, rtol=1e-4)
+    assert "/rays_0/camera" in viewer.stage.nodes.visible
+    viewer.controls.change(frame=1, rays=True)
+    assert damaged.name in viewer.controls._fault.content
+    assert viewer.controls.boxes["rays"].disabled
+    assert {"/surface/0", "/frame_1/camera"} <= set(viewer.stage.nodes.visible)
+    assert not any("rays" in name for name in viewer.stage.nodes.visible)
 
 
 def test_own_surfaces_are_shown_with_their_frame(

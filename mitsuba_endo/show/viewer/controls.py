@@ -4,6 +4,7 @@ import threading
 from dataclasses import replace
 from typing import Any
 
+from ...errors import InputError
 from ...records.calibration import Snapshot
 from ..content import Content
 from ..numbers import headline
@@ -37,9 +38,20 @@ class Controls:
         """Change what is chosen and draw it."""
         with self._lock:
             self.choice = replace(self.choice, **changes)
-            self.stage.draw(self.choice)
+            try:
+                self.stage.draw(self.choice)
+            except InputError as error:
+                self._leave_rays_out(error)
             self._legend.content = self._legend_text()
             self._legend.visible = self.choice.snapshot is None and self.choice.surface
+
+    def _leave_rays_out(self, error: InputError) -> None:
+        """Say that a frame's maps, read when its rays are first wanted, cannot be read."""
+        self._fault.content = small(f"No rays: {error}")
+        box = self.boxes["rays"]
+        box.value, box.disabled = False, True
+        self.choice = replace(self.choice, rays=False)
+        self.stage.draw(self.choice)
 
     def truth_is_known(self) -> None:
         """Offer what can be shown with the truth that the content now has."""
@@ -76,6 +88,7 @@ class Controls:
                 "Some correspondences: both rays of each, blue from the camera, orange from the "
                 "projector; where they end is where they pass most closely",
             )  # fmt: skip
+            self._fault = gui.add_html("")
             self._truth = self._toggle("truth", "truth", False, "No truth lies with this result")
             self._truth.disabled = True
 
