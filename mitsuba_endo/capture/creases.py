@@ -1,5 +1,7 @@
 """Sharp edges: where shading must not be smooth."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,11 +12,13 @@ SHARP = np.radians(40)
 angle between two faces has 45 degrees, folds of tissue that a mesh resolves have less."""
 
 
+@lru_cache(maxsize=1)
 def with_creases(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return vertices and faces of the same surface whose corners at sharp edges stand alone.
 
     Mitsuba smooths normals over the faces that share a vertex; a corner with a vertex of its own
-    keeps its face's normal. No position changes.
+    keeps its face's normal. No position changes. The last mesh's are kept, for the picture and the
+    truth: change neither.
     """
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)  # its length weighs by area

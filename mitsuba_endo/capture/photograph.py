@@ -1,6 +1,7 @@
 """A simulated photograph: path tracing of tissue under the projector, then camera effects."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from .checks import check_mesh, check_pattern
 from .effects import apply_effects
 from .effects.encoding import Encoded
 from .settings import CaptureSettings
+
+if TYPE_CHECKING:
+    from .studio import Studio
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +63,38 @@ def photograph(
         InputError: a mesh in other units or wound at random, no pattern, or a camera that sees
             nothing or stands inside the wall (see :mod:`.checks`).
     """
+    studio = open_studio(mesh, camera, projector, pattern, settings, pattern_size)
+    studio.place(world_from_camera, projector_from_camera)
+    return develop(studio, camera, settings, seed)
+
+
+def open_studio(
+    mesh: Mesh,
+    camera: CameraModel,
+    projector: ProjectorModel,
+    pattern: NDArray[np.float32],
+    settings: CaptureSettings,
+    pattern_size: tuple[int, int] | None = None,
+) -> "Studio":
+    """Return the scene of a photograph whose poses are to be found; arguments as above.
+
+    Raises:
+        InputError: a mesh in other units or wound at random, or no pattern.
+    """
     check_mesh(mesh)
     check_pattern(pattern)
     backend.ensure()
-    from .studio import SetUp, trace
+    from .studio import SetUp, Studio
 
     size = pattern_size or (pattern.shape[1], pattern.shape[0])
-    setup = SetUp(mesh, camera, world_from_camera, projector, projector_from_camera, pattern, size)
-    laser, lamp = trace(setup, settings, seed)
+    return Studio(SetUp(mesh, camera, projector, pattern, size), settings)
+
+
+def develop(
+    studio: "Studio", camera: CameraModel, settings: CaptureSettings, seed: int
+) -> Photograph:
+    """Return the photograph that a studio's camera takes from where it was placed."""
+    laser, lamp = studio.trace(seed)
     radiance = laser + lamp
     image = apply_effects(
         radiance, settings.effects, seed, laser=laser, cosine=cosine_to_axis(camera)

@@ -11,8 +11,8 @@ from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..rendering import keys
 from ..rendering.axes import to_world_from_pose
-from ..rendering.rays import pixel_rays
-from ..rendering.untyped import dr, mi
+from ..rendering.synthetic import Hits, MeshScene
+from ..rendering.untyped import mi
 from ..shapes.mesh import Mesh
 from .checks import check_view
 from .creases import with_creases
@@ -34,41 +34,35 @@ _LONGEST_WALK = 256
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """Geometry of one photograph; poses have OpenCV axes."""
+    """What stands in the studio, whatever the poses."""
 
     mesh: Mesh
     """In the world, mm."""
     camera: CameraModel
-    world_from_camera: RigidTransform
     projector: ProjectorModel
-    projector_from_camera: RigidTransform
     pattern: NDArray[np.float32]
     """(H, W, 3) linear RGB."""
     pattern_size: tuple[int, int]
     """Width and height, pattern pixels."""
 
 
-def trace(
-    setup: SetUp, settings: CaptureSettings, seed: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the radiance (h, w, 3) by the laser and by the lamp, each from a pass of its own.
+@dataclass(frozen=True, eq=False)
+class _View:
+    """What the camera sees from where it stands."""
 
-    A pass for each light, because speckle belongs to the laser, and because the path tracer
-    chooses one light at random at every reflection, which would turn two into noise.
-    """
-    studio = Studio(setup, settings)
-    laser = studio.by(keys.PROJECTOR, settings.spp, 2 * seed)
-    if not settings.light.lamp:
-        return laser, np.zeros_like(laser)
-    spp = max(1, settings.spp // LAMP_SAMPLES)
-    return laser, studio.by(keys.LAMP, spp, 2 * seed + 1)
+    hits: Hits
+    points: NDArray[np.float32]
+    """(h, w, 3) surface points of the pixels, mm; NaN where there is none."""
+    pixels_per_mm: NDArray[np.float32]
+    """(h, w) on a surface across the ray."""
 
 
 class Studio:
-    """One loaded scene, rendered light by light."""
+    """One scene, loaded once: to look for a place in it, and to be rendered light by light."""
 
     def __init__(self, setup: SetUp, settings: CaptureSettings) -> None:
-        self._tissue, self._setup = settings.tissue, setup
+        """Load the scene; camera and projector stand at the origin until :meth:`place`."""
+        self._tissue, self._setup, self._settings = settings.tissue, setup, settings
         medium = None
         bsdf = opaque_tissue(self._tissue)
         walk = {"type": "path", "max_depth": settings.max_depth}
@@ -76,14 +70,55 @@ class Studio:
             bsdf, medium = translucent_tissue(self._tissue)
             walk = {"type": "volpath", "max_depth": _LONGEST_WALK}
         self._integrator: Any = mi.load_dict(walk)
+        self._direct: Any = mi.load_dict({"type": "path", "max_depth": 2})
         self._scene: Any = mi.load_dict({
             "type": "scene", keys.CAMERA: _sensor(setup),
             keys.SURFACE: _surface(setup.mesh, bsdf, medium), **_lights(setup, settings.light),
         })  # fmt: skip
         self._parameters = mi.traverse(self._scene)
-        self._look()
+        self._view: _View | None = None
+        self.surface = MeshScene(setup.mesh.vertices, setup.mesh.faces, self._scene)
+        """The mesh, to follow rays."""
 
-    def by(self, light: str, spp: int, seed: int) -> NDArray[np.float32]:
+    def place(
+        self, world_from_camera: RigidTransform, projector_from_camera: RigidTransform
+    ) -> Hits:
+        """Put camera, projector and lamp in their places (poses with OpenCV axes).
+
+        Returns:
+            Where the rays through the pixels' centres, row by row, meet the mesh.
+
+        Raises:
+            InputError: the camera sees nothing or stands inside the wall.
+        """
+        world_from_projector = world_from_camera @ projector_from_camera.inverse()
+        values = {
+            keys.to_world(keys.CAMERA): _pose(world_from_camera),
+            keys.to_world(keys.PROJECTOR): _pose(world_from_projector),
+        }
+        light = self._settings.light
+        if light.lamp:
+            ends = world_from_camera.apply(_lamp_ends(light.lamp_offset))
+            values |= {
+                keys.position(_lamp(i)): mi.Point3f(*end.tolist()) for i, end in enumerate(ends)
+            }
+        self._set(values)
+        self._view = self._look(world_from_camera)
+        return self._view.hits
+
+    def trace(self, seed: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the radiance (h, w, 3) by the laser and by the lamp, each from a pass of its own.
+
+        A pass for each light, because speckle belongs to the laser, and because the path tracer
+        chooses one light at random at every reflection, which would turn two into noise.
+        """
+        spp = self._settings.spp
+        laser = self._by(keys.PROJECTOR, spp, 2 * seed)
+        if not self._settings.light.lamp:
+            return laser, np.zeros_like(laser)
+        return laser, self._by(keys.LAMP, max(1, spp // LAMP_SAMPLES), 2 * seed + 1)
+
+    def _by(self, light: str, spp: int, seed: int) -> NDArray[np.float32]:
         """Return the radiance (h, w, 3) by the light whose ids begin with ``light``."""
         for emitter in self._scene.emitters():
             chosen = float(emitter.id().startswith(light))
@@ -94,8 +129,7 @@ class Studio:
         self._set(entering_part(self._tissue))
         entered = self._spread(self._image(self._integrator, spp, seed))
         self._set(reflected_part(self._tissue))
-        direct: Any = mi.load_dict({"type": "path", "max_depth": 2})
-        return entered + self._image(direct, spp, seed)
+        return entered + self._image(self._direct, spp, seed)
 
     def _set(self, values: dict[str, Any]) -> None:
         for key, value in values.items():  # update(values) would pass over unknown keys
@@ -107,24 +141,27 @@ class Studio:
         return np.array(image, np.float32)[..., :3]
 
     def _spread(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        tissue = self._tissue
+        tissue, view = self._tissue, self._view
+        assert view is not None, "place() comes first"
         return subsurface_blur(
-            image, self._points, self._pixels_per_mm, tissue.mean_free_path, tissue.base_color,
+            image, view.points, view.pixels_per_mm, tissue.mean_free_path, tissue.base_color,
             index_of_refraction(tissue.specular),
         )  # fmt: skip
 
-    def _look(self) -> None:
-        """Find the points that pixels see (h, w, 3), mm, NaN = none, and pixels per mm (h, w)."""
-        ray, width, height = pixel_rays(self._scene.sensors()[0])
-        found = self._scene.ray_intersect(ray)
-        hit = found.is_valid()
-        distance = dr.select(hit, found.t, dr.nan)
-        self._points = np.array(ray(distance), np.float32).T.reshape(height, width, 3)
-        along = np.array(distance, np.float32).reshape(height, width)
-        self._pixels_per_mm = np.float32(self._setup.camera.K[0, 0]) / along
-        seen = hit.numpy()
-        away = (dr.dot(found.n, ray.d) > 0).numpy()
-        check_view(float(seen.mean()), float(away[seen].mean()) if seen.any() else 0.0)
+    def _look(self, world_from_camera: RigidTransform) -> _View:
+        camera = self._setup.camera
+        hits = self.surface.through_pixels(camera, world_from_camera)
+        seen = hits.hit
+        ways = hits.points - world_from_camera.t
+        away = np.einsum("ni,ni->n", hits.normals[seen], ways[seen]) > 0
+        check_view(float(seen.mean()), float(away.mean()) if seen.any() else 0.0)
+        distance = np.where(seen, np.sqrt(np.einsum("ni,ni->n", ways, ways)), np.nan)
+        shape = camera.height, camera.width
+        return _View(
+            hits,
+            np.where(seen[:, None], hits.points, np.nan).astype(np.float32).reshape(*shape, 3),
+            (camera.K[0, 0] / distance).astype(np.float32).reshape(shape),
+        )
 
 
 def mean_intensity(setup: SetUp) -> float:
@@ -137,12 +174,13 @@ def _lights(setup: SetUp, light: Light) -> dict[str, Any]:
     lights = {keys.PROJECTOR: _projector(setup, light.projector_power)}
     if light.lamp:
         intensity = light.lamp * light.projector_power * mean_intensity(setup)
-        lights |= _lamps(setup, light.lamp_offset, intensity * np.array(light.lamp_color))
+        lights |= _lamps(light.lamp_offset, intensity * np.array(light.lamp_color))
     return lights
 
 
 def _pose(world_from_object: RigidTransform) -> Any:
-    return mi.ScalarTransform4f(to_world_from_pose(world_from_object).tolist())
+    matrix = to_world_from_pose(world_from_object).tolist()
+    return mi.AffineTransform4f(mi.ScalarAffineTransform4f(matrix))
 
 
 def _sensor(setup: SetUp) -> dict[str, Any]:
@@ -151,7 +189,7 @@ def _sensor(setup: SetUp) -> dict[str, Any]:
             "rfilter": {"type": "box"}, "pixel_format": "rgb"}  # fmt: skip
     lens = dict(zip(keys.LENSES[camera.model], (float(k) for k in camera.distortion), strict=False))
     return {
-        "type": "endoscope", "model": camera.model, "to_world": _pose(setup.world_from_camera),
+        "type": "endoscope", "model": camera.model,
         "fx": float(K[0, 0]), "fy": float(K[1, 1]), "cx": float(K[0, 2]), "cy": float(K[1, 2]),
         "film": film, **lens,
     }  # fmt: skip
@@ -161,10 +199,9 @@ def _projector(setup: SetUp, power: float) -> dict[str, Any]:
     projector = setup.projector
     image = np.ascontiguousarray(setup.pattern, np.float32)
     width, height = setup.pattern_size
-    world_from_projector = setup.world_from_camera @ setup.projector_from_camera.inverse()
     coefficients = (float(k) for k in projector.distortion.coefficients)
     return {
-        "type": "doe_projector", "law": projector.law, "to_world": _pose(world_from_projector),
+        "type": "doe_projector", "law": projector.law,
         "width": width, "height": height, "focal": float(projector.focal),
         "centre_x": float(projector.centre[0]), "centre_y": float(projector.centre[1]),
         "aspect": float(projector.aspect), "power": power,
@@ -174,16 +211,24 @@ def _projector(setup: SetUp, power: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _lamps(setup: SetUp, offset: float, intensity: NDArray[np.float64]) -> dict[str, Any]:
+def _lamps(offset: float, intensity: NDArray[np.float64]) -> dict[str, Any]:
     """Return two light guides beside the lens that share the intensity (3,)."""
-    ends = setup.world_from_camera.apply(np.array([[-offset, 0.0, 0.0], [offset, 0.0, 0.0]]))
     return {
-        f"{keys.LAMP}_{i}": {
+        _lamp(i): {
             "type": "point", "position": end.tolist(),
             "intensity": {"type": "rgb", "value": (intensity / 2).tolist()},
         }
-        for i, end in enumerate(ends)
+        for i, end in enumerate(_lamp_ends(offset))
     }  # fmt: skip
+
+
+def _lamp(number: int) -> str:
+    return f"{keys.LAMP}_{number}"
+
+
+def _lamp_ends(offset: float) -> NDArray[np.float64]:
+    """Return where the light guides end (2, 3), mm in the camera's frame."""
+    return np.array([[-offset, 0.0, 0.0], [offset, 0.0, 0.0]])
 
 
 def _surface(mesh: Mesh, bsdf: dict[str, Any], medium: dict[str, Any] | None) -> Any:

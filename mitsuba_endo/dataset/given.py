@@ -8,6 +8,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from .. import backend
+from ..capture.checks import check_winding
 from ..errors import InputError
 from ..records.surface import load_surface
 from ..rendering.scene_surfaces import scene_mesh
@@ -18,8 +19,6 @@ from .config import Scene
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
 SMALLEST, LARGEST = 5.0, 3000.0
 """Sizes of a believable surface (diagonal of its box), mm: others are mistaken units."""
-CONFLICTS = 0.01
-"""Share of edges along which neighbouring faces may be wound against each other."""
 PROBES, RAYS = 200, 32
 CLEAR = 0.05
 """Least difference between both sides' shares of rays that meet the surface again, for one side to
@@ -42,7 +41,7 @@ def prepare_given(scene: Scene) -> Mesh:
     mesh = Mesh(raw.vertices * MM[scene.unit], raw.faces)
     _check_size(mesh, source, scene.unit)
     mesh = _joined(mesh)
-    _check_winding(mesh, source)
+    check_winding(mesh, source)
     if scene.side == "front":
         return mesh
     return _turned(mesh, scene.side, source)
@@ -72,19 +71,6 @@ def _joined(mesh: Mesh) -> Mesh:
     merged = trimesh.Trimesh(mesh.vertices, mesh.faces, process=True)
     kept = merged.area_faces > 0
     return Mesh(np.array(merged.vertices, np.float64), np.array(merged.faces[kept], np.int64))
-
-
-def _check_winding(mesh: Mesh, source: str) -> None:
-    """Refuse faces wound at random; a few edges with three faces do no harm."""
-    i, j = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    _, counts = np.unique(i * len(mesh.vertices) + j, return_counts=True)
-    conflicts = float((counts - 1).sum() / len(i))
-    if conflicts > CONFLICTS:
-        raise InputError(
-            f"{100 * conflicts:.0f} % of the edges join faces that are wound against each other",
-            source,
-            "orient its faces alike",
-        )
 
 
 def _turned(mesh: Mesh, side: str, source: str) -> Mesh:

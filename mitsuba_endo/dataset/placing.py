@@ -107,18 +107,18 @@ class _Judge:
 
     def _from_behind(self, world_from_camera: RigidTransform) -> float:
         """Return the share of the surface's image in which its faces point away."""
-        ways = world_from_camera.rotate(self.camera.grid_rays.reshape(-1, 3))
-        met = self.scene.cast(world_from_camera.t, ways)
-        away = np.einsum("ni,ni->n", met.normals, ways) > 0
+        met = self.scene.through_pixels(self.camera, world_from_camera)
+        away = np.einsum("ni,ni->n", met.normals, met.points - world_from_camera.t) > 0
         return float(away[met.hit].mean()) if met.hit.any() else 0.0
 
 
 def clearance(mesh: Mesh, point: Array, within: float) -> float:
     """Return the distance of a point (3,) from a mesh, mm; infinite beyond ``within``."""
-    corners = mesh.vertices[mesh.faces]
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     # A face nearer than `within` reaches into the box around the point.
-    low, high = corners.min(1) - within, corners.max(1) + within
-    near = corners[((point >= low) & (point <= high)).all(1)]
+    low = np.minimum(np.minimum(a, b), c) - within
+    high = np.maximum(np.maximum(a, b), c) + within
+    near = mesh.vertices[mesh.faces[((point >= low) & (point <= high)).all(1)]]
     if not len(near):
         return float("inf")
     closest = trimesh.triangles.closest_point(near, np.tile(point, (len(near), 1)))

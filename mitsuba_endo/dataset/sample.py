@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..capture.photograph import photograph
+from ..capture.photograph import develop, open_studio
 from ..decode.grid_pattern import CodedGrid
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
@@ -19,7 +19,6 @@ from ..records.solution import (
     ProjectorEstimate,
     Solution,
 )
-from ..rendering.synthetic import MeshScene
 from ..shapes.mesh import Mesh
 from .config import Config
 from .optics import ProjectorDraw, draw_camera, draw_projector
@@ -73,19 +72,18 @@ def make_sample(config: Config, index: int, workshop: Workshop) -> Sample:
     camera = draw_camera(config.camera, optics)
     projector = draw_projector(config.projector, size, optics)
     settings = config.capture.draw(stream(config.seed, "capture", index))
-    scene = MeshScene(surface.mesh.vertices, surface.mesh.faces)
+    # One scene for the search of a place, the picture and the truth: its search tree takes long.
+    studio = open_studio(surface.mesh, camera, projector, workshop.pattern(variant), settings, size)
     placed = find_place(
-        surface.stance, drawn_from.view, config.placing, surface.mesh, scene, camera, projector,
-        size, ProjectorDraw(config.projector), stream(config.seed, "place", index),
+        surface.stance, drawn_from.view, config.placing, surface.mesh, studio.surface, camera,
+        projector, size, ProjectorDraw(config.projector), stream(config.seed, "place", index),
     )  # fmt: skip
+    hits = studio.place(placed.world_from_camera, placed.projector_from_camera)
     seed = int(stream(config.seed, "photograph", index).integers(2**30))
-    picture = photograph(
-        surface.mesh, camera, placed.world_from_camera, projector, placed.projector_from_camera,
-        workshop.pattern(variant), settings, seed, pattern_size=size,
-    )  # fmt: skip
+    picture = develop(studio, camera, settings, seed)
     maps = truth_maps(
-        scene, surface.mesh, camera, placed.world_from_camera, projector,
-        placed.projector_from_camera, grid,
+        studio.surface, surface.mesh, camera, placed.world_from_camera, projector,
+        placed.projector_from_camera, grid, hits,
     )  # fmt: skip
     camera_from_world = placed.world_from_camera.inverse()
     description = {

@@ -59,11 +59,15 @@ def truth_maps(
     projector: ProjectorModel,
     projector_from_camera: RigidTransform,
     grid: CodedGrid,
+    hits: Hits | None = None,
 ) -> TruthMaps:
-    """Compute the truth of one view with one ray through every pixel's centre."""
+    """Compute the truth of one view with one ray through every pixel's centre.
+
+    ``hits`` are the places where these rays meet the mesh, if they are known already.
+    """
     shape = camera.height, camera.width
     ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
-    hits = scene.cast(world_from_camera.t, ways)
+    hits = hits or scene.through_pixels(camera, world_from_camera)
     points = world_from_camera.inverse().apply(hits.points)
     q = np.where(hits.hit[:, None], projector.project(projector_from_camera.apply(points)), np.nan)
     light = (world_from_camera @ projector_from_camera.inverse()).t
@@ -105,12 +109,19 @@ def _normals(mesh: Mesh, hits: Hits, ways: Array) -> Array:
     square = np.einsum("ni,ni->n", face, face)
     v = np.einsum("ni,ni->n", np.cross(rest, c - a), face) / square
     w = np.einsum("ni,ni->n", np.cross(b - a, rest), face) / square
-    smooth = vertex_normals(shaded)
+    smooth = vertex_normals(_around(shaded, corners))
     na, nb, nc = (smooth[corners[:, i]] for i in range(3))
     normal = na + v[:, None] * (nb - na) + w[:, None] * (nc - na)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     towards = np.where(np.einsum("ni,ni->n", normal, ways) > 0, -1.0, 1.0)
     return np.where(hits.hit[:, None], normal * towards[:, None], np.nan)
+
+
+def _around(mesh: Mesh, corners: NDArray[np.int64]) -> Mesh:
+    """Return the mesh with only the faces at the vertices ``corners``: all their normals need."""
+    wanted = np.zeros(len(mesh.vertices), bool)
+    wanted[corners] = True
+    return Mesh(mesh.vertices, mesh.faces[wanted[mesh.faces].any(1)])
 
 
 def vertex_normals(mesh: Mesh) -> Array:

@@ -18,7 +18,7 @@ from .streams import stream
 FIGURE = "rabbit"
 FIGURE_HEIGHT = 60.0
 FIGURE_EDGE = 1.0
-KEPT = 4
+KEPT = 16
 """Patterns held in memory by a process."""
 
 

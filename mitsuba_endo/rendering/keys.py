@@ -60,6 +60,11 @@ def to_world(identifier: str) -> str:
     return f"{identifier}.to_world"
 
 
+def position(identifier: str) -> str:
+    """Return the key of a point light's place in the world."""
+    return f"{identifier}.position"
+
+
 def intrinsics(camera: str = CAMERA) -> tuple[str, str, str, str]:
     """Return the keys of fx, fy, cx, cy, pixels."""
     return f"{camera}.fx", f"{camera}.fy", f"{camera}.cx", f"{camera}.cy"

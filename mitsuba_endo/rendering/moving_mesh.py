@@ -29,7 +29,12 @@ class MovingMesh:
 
     def cast(self, origin: Any, direction: Any) -> tuple[Any, Any]:
         """Return (triangle index, hit) of rays given as Dr.Jit vectors of any precision."""
-        ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
-        found = self._scene.ray_intersect_preliminary(ray, coherent=True)
-        hit = found.is_valid()
-        return dr.select(hit, found.prim_index, 0), hit
+        return cast_into(self._scene, origin, direction)
+
+
+def cast_into(scene: Any, origin: Any, direction: Any) -> tuple[Any, Any]:
+    """Return (triangle index, hit) of rays into a scene of one mesh, as :meth:`MovingMesh.cast`."""
+    ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+    found = scene.ray_intersect_preliminary(ray, coherent=True)
+    hit = found.is_valid()
+    return dr.select(hit, found.prim_index, 0), hit

@@ -1,6 +1,8 @@
 """Exact correspondences of a mesh, for any poses, without a scene file."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from .moving_mesh import MovingMesh
+from .moving_mesh import MovingMesh, cast_into
 from .untyped import mi
 
 
@@ -40,9 +42,20 @@ class Hits:
 class MeshScene:
     """A mesh in the world, of which views give correspondences."""
 
-    def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    def __init__(
+        self, vertices: NDArray[np.float64], faces: NDArray[np.int64], scene: Any = None
+    ) -> None:
+        """Keep the mesh, mm, and make a scene of it unless there is one.
+
+        Args:
+            vertices: (V, 3).
+            faces: (F, 3).
+            scene: the ``mi.Scene`` whose only shape is this mesh with its faces in this order.
+        """
         self._vertices, self._faces = vertices, faces
-        self._mesh = MovingMesh(vertices, faces)
+        self._cast: Callable[[Any, Any], tuple[Any, Any]] = (
+            MovingMesh(vertices, faces).cast if scene is None else partial(cast_into, scene)
+        )
 
     def view(
         self,
@@ -61,8 +74,7 @@ class MeshScene:
             projector_from_camera: its pose relative to the camera.
             size: pattern (width, height); coordinates outside are missing. None: no limit.
         """
-        rays = camera.grid_rays.reshape(-1, 3)
-        seen = self.cast(world_from_camera.t, world_from_camera.rotate(rays))
+        seen = self.through_pixels(camera, world_from_camera)
         points, hit = seen.points, seen.hit
         camera_from_world = world_from_camera.inverse()
         world_from_projector = world_from_camera @ projector_from_camera.inverse()
@@ -77,10 +89,16 @@ class MeshScene:
             np.where(hit[:, None], at, np.nan).reshape(*shape, 3),
         )
 
+    def through_pixels(self, camera: CameraModel, world_from_camera: RigidTransform) -> Hits:
+        """Follow the rays through all pixels' centres, row by row."""
+        ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
+        return self.cast(world_from_camera.t, ways)
+
     def cast(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
         """Follow rays from an origin (3,), or one for each (N, 3), along directions (N, 3)."""
-        triangle, hit = self._mesh.cast(_vector(np.broadcast_to(origin, directions.shape)),
-                                        _vector(directions))  # fmt: skip
+        triangle, hit = self._cast(
+            _vector(np.broadcast_to(origin, directions.shape)), _vector(directions)
+        )
         index = triangle.numpy().astype(np.int64)
         a, b, c = (self._vertices[self._faces[index, i]] for i in range(3))
         normal = np.cross(b - a, c - a)

@@ -14,7 +14,7 @@ def random_waves(points: Array, wavelength: float, rng: np.random.Generator) -> 
     count, dimension = 32, points.shape[-1]
     direction = rng.normal(size=(count, dimension))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    return _sum_of_waves(points, direction, wavelength, rng)[0]
+    return _sum_of_waves(points, direction, wavelength, rng)
 
 
 def ridge_waves(
@@ -36,20 +36,26 @@ def ridge_waves(
     """
     angle = orientation + np.pi / 2 + spread * rng.normal(size=32)
     direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    field, gradient = _sum_of_waves(points, direction, wavelength, rng)
+    gradient = np.zeros(points.shape)
+    field = _sum_of_waves(points, direction, wavelength, rng, gradient)
     return field, np.linalg.norm(gradient, axis=-1)
 
 
 def _sum_of_waves(
-    points: Array, direction: Array, wavelength: float, rng: np.random.Generator
-) -> tuple[Array, Array]:
-    """Return the field (...) and its gradient (..., D) for unit `direction` (N, D) of the waves."""
+    points: Array, direction: Array, wavelength: float, rng: np.random.Generator,
+    gradient: Array | None = None,
+) -> Array:  # fmt: skip
+    """Return the field (...) for unit `direction` (N, D) of the waves.
+
+    Its gradient is added to `gradient` (..., D), if given: it costs three times the field.
+    """
     count = len(direction)
     number = 2 * np.pi / (wavelength * rng.uniform(0.8, 1.2, count))
     phase = rng.uniform(0, 2 * np.pi, count)
-    total, gradient = np.zeros(points.shape[:-1]), np.zeros(points.shape)
+    total, scale = np.zeros(points.shape[:-1]), np.sqrt(2 / count)
     for wave, offset in zip(number[:, None] * direction, phase, strict=True):
         angle = points @ wave + offset
         total += np.cos(angle)
-        gradient -= np.sin(angle)[..., None] * wave
-    return total * np.sqrt(2 / count), gradient * np.sqrt(2 / count)
+        if gradient is not None:
+            gradient -= np.sin(angle)[..., None] * (scale * wave)
+    return total * scale
