@@ -12,6 +12,7 @@ from .console import Debug, Json, Quiet, Session, session
 from .decode import decode_images
 from .evaluate import evaluate_folders
 from .render import capture_scene
+from .report import write_report
 
 if TYPE_CHECKING:
     from ..evaluate.metrics import Metrics
@@ -52,9 +53,12 @@ def demo(
             paths = decode_images([folder / "input" / IMAGE], rig_file, None, decoded, output)
             maps, rig = load_input(paths, rig_file)
             solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
-            metrics = evaluate_folders(folder / "solution", folder / "capture" / "truth.json")
+            # Only now, after the solve, is the truth looked at.
+            true = folder / "capture" / "truth.json"
+            metrics = evaluate_folders(folder / "solution", true)
             metrics.save(folder / "metrics.json")
-            truth = load_solution(folder / "capture" / "truth.json")
+            write_report([folder / "solution"], folder / "solution" / "report.html", true)
+            truth = load_solution(true)
         _report(solution, truth, metrics, out, time.perf_counter() - started, output)
         raise typer.Exit(exit_code(solution))
 
@@ -90,7 +94,7 @@ def _report(
         f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
         f"  {out}/capture/image.png        what the endoscope sees",
         f"  {out}/decoded/image_graph.png  the grid found in it",
-        f"  {out}/solution/report.html     verdict, maps, residuals, surface and rig",
+        f"  {out}/solution/report.html     verdict, maps, surface with its error, rig",
         f"  {out}/solution/solution.json   the result, {out}/metrics.json its errors",
         f"Again by hand: mitsuba-endo calibrate {out}/input/{IMAGE} "
         f"--rig {out}/input/rig.yaml --out result",

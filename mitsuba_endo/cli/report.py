@@ -22,19 +22,28 @@ def report(
 ) -> None:
     """Make the report of one result, or compare several."""
     with session(quiet, as_json, debug) as output:
-        from ..show.read_folder import read_solution_folder
-        from ..show.report import save_report
-        from ..show.truth import find_truth
-
-        calibrations = [read_solution_folder(path) for path in results]
-        truths = [
-            truth or find_truth(path, calibration.solution)
-            for path, calibration in zip(results, calibrations, strict=True)
-        ]
-        named = list(zip(_names(results), calibrations, strict=True))
-        save_report(out, named, truths=truths)
+        write_report(results, out, truth)
         output.print(f"{out}: open it in a browser.")
         output.summary({"report": str(out), "results": [str(r) for r in results]})
+
+
+def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
+    """Write the report of solution folders, with the truth given or the one that lies with each.
+
+    Raises:
+        InputError: a file is missing or damaged, or the truth is not that of its result.
+    """
+    from ..show.read_folder import read_solution_folder
+    from ..show.report import save_report
+    from ..show.truth import find_truth
+
+    calibrations = [read_solution_folder(path) for path in results]
+    truths = [
+        truth or find_truth(path, calibration.solution)
+        for path, calibration in zip(results, calibrations, strict=True)
+    ]
+    named = list(zip(_names(results), calibrations, strict=True))
+    save_report(out, named, truths=truths)
 
 
 def _names(results: list[Path]) -> list[str]:

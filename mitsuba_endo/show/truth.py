@@ -44,9 +44,16 @@ def find_truth(result: str | Path, solution: Solution) -> Path | None:
                 _, matched_by = match_frames(solution, truth)
             except InputError:
                 continue  # another result's, or no truth at all
-            if matched_by == "name" and truth.camera == solution.camera:
+            named = matched_by == "name" or _is_decoded(solution, truth, path.parent)
+            if named and truth.camera == solution.camera:
                 return path.resolve()
     return None
+
+
+def _is_decoded(solution: Solution, truth: Solution, folder: Path) -> bool:
+    """Tell whether the one frame is called as the capture's image, from which it was decoded."""
+    image = folder / Path(solution.frames[0].name).with_suffix(".png").name
+    return len(truth.frames) == 1 and image.is_file()
 
 
 def load_truth(path: str | Path, calibration: Calibration) -> Truth:

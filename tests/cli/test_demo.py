@@ -54,6 +54,13 @@ def test_demo_leaves_everything_it_names(finished: tuple[Path, dict[str, Any]]):
     assert [p.name for p in out.parent.iterdir()] == ["out"]
 
 
+def test_report_shows_the_error(finished: tuple[Path, dict[str, Any]]):
+    """Oracle: the name of that view of the surface; a calibration of the input alone has none
+    (test_input_alone_gives_the_same_result), and gives the same numbers."""
+    page = (finished[0] / "solution" / "report.html").read_text("utf-8")
+    assert "error to truth" in page
+
+
 def test_input_holds_no_answer(finished: tuple[Path, dict[str, Any]]):
     """Oracle: the list of unknowns; there are no coordinates."""
     out, _ = finished
@@ -78,6 +85,7 @@ def test_input_alone_gives_the_same_result(finished: tuple[Path, dict[str, Any]]
         there["projector"]["focal"]["value"], rel=1e-5
     )
     assert "Projector pose" in done.stderr
+    assert "error to truth" not in (tmp_path / "again" / "report.html").read_text("utf-8")
 
 
 def test_evaluate_gives_the_same_metrics(finished: tuple[Path, dict[str, Any]], tmp_path: Path):

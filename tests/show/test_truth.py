@@ -52,6 +52,28 @@ def test_is_found_where_a_capture_lies(tmp_path: Path, calibration: Calibration)
     assert find_truth(result, solution) == tmp_path / "truth.json"
 
 
+def test_is_found_for_an_image_that_was_decoded(tmp_path: Path, calibration: Calibration):
+    """Oracle: the demo's folders, where the frame is called as the capture's image; without such
+    an image, or with two frames, a truth of other names is not taken."""
+
+    def named(*names: str) -> Solution:
+        frames = [
+            frame.model_copy(update={"name": name})
+            for frame, name in zip(calibration.solution.frames, names, strict=False)
+        ]
+        return calibration.solution.model_copy(update={"frames": frames})
+
+    result = tmp_path / "solution"
+    result.mkdir()
+    one = replace(calibration, solution=named("map.exr"))
+    path = write_truth(tmp_path / "capture", one)
+    assert find_truth(result, named("image.exr")) is None
+    (path.parent / "image.png").touch()
+    assert find_truth(result, named("image.exr")) == path
+    assert find_truth(result, named("photo.exr")) is None
+    assert find_truth(result, named("image.exr", "second.exr")) is None
+
+
 def test_error_is_along_the_rays(calibration: Calibration):
     """Oracle: a surface 1 % nearer than the truth: -1 % of the true range, whatever the direction;
     a ray beside the truth has none."""
