@@ -18,7 +18,10 @@ def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
 
     def aside(match: re.Match[str]) -> str:
         block = match["block"]
-        formulas.append(convert(block or match["inline"], display="block" if block else "inline"))
+        formula = convert(block or match["inline"], display="block" if block else "inline")
+        # A window narrower than an equation scrolls that equation alone.
+        wide = f'<span style="display:block;overflow-x:auto">{formula}</span>'
+        formulas.append(wide if block else formula)
         return _MARK.format(len(formulas) - 1)
 
     parts = _CODE.split(markdown)
