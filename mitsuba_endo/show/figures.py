@@ -1,11 +1,13 @@
 """Figures of a calibration: functions from records to matplotlib figures, no global state."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
@@ -104,17 +106,39 @@ def surface_figure(
         unit: of length.
         error: (H, W) found minus true range along the camera's rays.
     """
+    drawn = _surface_panels(view, unit, error)
     height, width = view.depth.shape
-    count = 1 + (view.std is not None) + (error is not None)
+    count = len(drawn)
     size = np.array(_size(width, height, count, 1)) * min(1.0, 2.2 / count)  # keeps text readable
     figure = Figure(figsize=(size[0], size[1]), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(1, count))
-    panels.depth(axes[0], view, unit, "Surface in the first camera")
-    if view.std is not None:
-        panels.surface_std(axes[1], view, unit)
-    if error is not None:
-        panels.surface_error(axes[-1], error, unit)
+    for axes, draw in zip(np.atleast_1d(figure.subplots(1, count)), drawn, strict=True):
+        draw(axes)
     return figure
+
+
+def surface_figures(
+    view: SurfaceView, unit: str, error: NDArray[np.float64] | None = None
+) -> list[Figure]:
+    """Draw the panels of :func:`surface_figure` one by one, for a page that places them."""
+    height, width = view.depth.shape
+    size = 0.8 * np.array(_size(width, height, 1, 1))  # keeps text readable
+    figures = []
+    for draw in _surface_panels(view, unit, error):
+        figure = Figure(figsize=(size[0], size[1]), layout="constrained")
+        draw(figure.subplots())
+        figures.append(figure)
+    return figures
+
+
+def _surface_panels(
+    view: SurfaceView, unit: str, error: NDArray[np.float64] | None
+) -> list[Callable[[Axes], None]]:
+    drawn = [partial(panels.depth, view=view, unit=unit, title="Surface in the first camera")]
+    if view.std is not None:
+        drawn.append(partial(panels.surface_std, view=view, unit=unit))
+    if error is not None:
+        drawn.append(partial(panels.surface_error, error=error, unit=unit))
+    return drawn
 
 
 def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:

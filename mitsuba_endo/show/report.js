@@ -24,7 +24,7 @@ function decoded(text) {
   return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 }
 
-// Points sorted by depth and painted back to front: needs no WebGL, so it works everywhere.
+// Patches sorted by depth and painted back to front: needs no WebGL, so it works everywhere.
 function connectScene(space) {
   const data = JSON.parse(space.dataset.scene);
   const names = JSON.parse(space.dataset.frames);
@@ -35,6 +35,7 @@ function connectScene(space) {
   const boxes = [...space.querySelectorAll("[type=checkbox]")];
   const legends = [...space.querySelectorAll(".legend")];
   const surfaces = data.surfaces.map((s) => new Float32Array(decoded(s.points)));
+  const patches = data.surfaces.map((s) => new Uint16Array(decoded(s.quads)));
   const colours = data.colours.map((q) => q.map((c) => new Uint8Array(decoded(c))));
   const context = canvas.getContext("2d");
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
@@ -50,7 +51,7 @@ function connectScene(space) {
   }
   const centre = low.map((v, i) => (v + high[i]) / 2);
   const radius = Math.hypot(...low.map((v, i) => (high[i] - v) / 2));
-  let points, colour, size, lines, order, sx, sy, depth;
+  let points, quads, colour, lines, order, sx, sy, depth, behind;
   let yaw, pitch, zoom, pending = false;
 
   function choose() {
@@ -59,11 +60,12 @@ function connectScene(space) {
     const quantity = Math.max(0, radios.findIndex((r) => r.checked));
     legends.forEach((l, i) => { l.hidden = i !== quantity; });
     const shown = surfaces.length > 1 && frame >= 0 ? frame : 0;
-    [points, colour, size] = [surfaces[shown], colours[quantity][shown], data.surfaces[shown].size];
+    [points, quads, colour] = [surfaces[shown], patches[shown], colours[quantity][shown]];
     const kinds = boxes.filter((b) => b.checked).map((b) => b.name);
     lines = data.lines.filter((l) => kinds.includes(l.kind) && (frame < 0 || l.frame === frame));
     const count = points.length / 3;
-    order = Uint32Array.from({ length: count }, (_, i) => i);
+    order = Uint32Array.from({ length: quads.length / 4 }, (_, i) => 4 * i);
+    behind = new Float32Array(quads.length);
     [sx, sy, depth] = [0, 1, 2].map(() => new Float32Array(count));
     redraw();
   }
@@ -81,15 +83,22 @@ function connectScene(space) {
     const width = canvas.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     const height = canvas.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     const scale = zoom * 0.5 * Math.min(width, height) / radius;
-    for (let i = 0; i < order.length; i++) {
+    for (let i = 0; i < depth.length; i++) {
       const at = project(points[3 * i], points[3 * i + 1], points[3 * i + 2], scale, width, height);
       sx[i] = at[0]; sy[i] = at[1]; depth[i] = at[2];
     }
-    order.sort((a, b) => depth[b] - depth[a]);
-    const side = Math.max(1.5 * ratio, 1.5 * scale * size);
-    for (const i of order) {
-      context.fillStyle = `rgb(${colour[3 * i]},${colour[3 * i + 1]},${colour[3 * i + 2]})`;
-      context.fillRect(sx[i] - side / 2, sy[i] - side / 2, side, side);
+    for (const q of order) behind[q] = depth[quads[q]] + depth[quads[q + 2]];
+    order.sort((a, b) => behind[b] - behind[a]);
+    context.lineWidth = ratio;  // closes the seams that smoothing leaves between patches
+    context.lineJoin = "bevel";
+    for (const q of order) {
+      const i = 3 * quads[q];
+      context.fillStyle = context.strokeStyle = `rgb(${colour[i]},${colour[i + 1]},${colour[i + 2]})`;
+      context.beginPath();
+      for (let k = q; k < q + 4; k++) context.lineTo(sx[quads[k]], sy[quads[k]]);
+      context.closePath();
+      context.fill();
+      context.stroke();
     }
     for (const line of lines) {
       context.strokeStyle = line.colour;

@@ -158,7 +158,10 @@ def charts(content: Content, view: SurfaceView, number: int) -> str:
     scale = trace[-1].scale_px if trace else None
     known_truth = content.truth is not None and content.truth.surface is not None
     error = view_error(content, 0, view) if known_truth else None
-    surface = figure_image(figures.surface_figure(view, content.unit, error))
+    surface = "".join(
+        f'<img alt="{figure.axes[0].get_title()}" src="{figure_image(figure)}">'
+        for figure in figures.surface_figures(view, content.unit, error)
+    )
     views = [view, *(view_surface(s, calibration.camera) for s in content.surfaces[1:])]
     drawn = [
         ("residual distribution", figures.histogram_figure(
@@ -175,7 +178,7 @@ def charts(content: Content, view: SurfaceView, number: int) -> str:
         )
     images = "".join(_chart(alt, figure) for alt, figure in drawn)
     return (
-        f'<h3>Surface</h3><img class="wide" alt="surface and its uncertainty" src="{surface}">'
+        f'<h3>Surface</h3><div class="surfaces">{surface}</div>'
         f"<h3>Surface and rig in space</h3><figure>{scene_canvas(content, views, number)}</figure>"
         f'<h3>Residuals, rig and convergence</h3><div class="charts">{images}</div>'
     )

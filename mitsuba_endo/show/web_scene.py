@@ -20,12 +20,15 @@ from .view import SurfaceView, range_of
 _POINTS = 12_000
 """Of one surface; of several together twice as many."""
 _TRUTH = "#3a3a3a"
+_STEEPEST = 12.0
+"""Slope against the image, beyond which neighbouring pixels see two surfaces and not one."""
 
 
 def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) -> str:
     """Return a canvas, with its controls, that report.js turns into a view to be turned.
 
-    Points are what the cameras see of their surfaces, in the first camera's frame.
+    Drawn is what the cameras see of their surfaces: points in the first camera's frame, and
+    quadrilaterals (Q, 4) of points that are neighbours in the image.
 
     Args:
         content: the result.
@@ -35,11 +38,12 @@ def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) ->
     if not any(np.isfinite(view.depth).any() for view in views):
         return "<p>The cameras see nothing of the surfaces.</p>"
     room = _POINTS if len(views) == 1 else 2 * _POINTS // len(views)
-    kept = [_thinned(view, room) for view in views]
+    steps = [_step(view, room) for view in views]
+    kept = [_thinned(*args) for args in zip(views, steps, strict=True)]
     quantities = _quantities(content, views, kept)
     data = {
         "surfaces": [
-            _surface(content, *args) for args in zip(range(len(views)), views, kept, strict=True)
+            _surface(content, *args) for args in zip(range(len(views)), views, steps, strict=True)
         ],
         "colours": [
             [
@@ -62,22 +66,39 @@ def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) ->
     )  # fmt: skip
 
 
-def _thinned(view: SurfaceView, room: int) -> NDArray[np.bool_]:
+def _step(view: SurfaceView, room: int) -> int:
+    """Return which pixels are left out, so that about ``room`` points are drawn."""
+    return max(1, math.ceil(math.sqrt(np.isfinite(view.depth).sum() / room)))
+
+
+def _thinned(view: SurfaceView, step: int) -> NDArray[np.bool_]:
     """Return the pixels (H, W) of a view whose points are drawn."""
-    seen = np.isfinite(view.depth)
-    step = max(1, math.ceil(math.sqrt(seen.sum() / room)))
-    kept = np.zeros_like(seen)
+    kept = np.zeros(view.depth.shape, bool)
     kept[::step, ::step] = True
-    return kept & seen
+    return kept & np.isfinite(view.depth)
 
 
-def _surface(
-    content: Content, index: int, view: SurfaceView, kept: NDArray[np.bool_]
-) -> dict[str, Any]:
-    points = content.first_from_surface(index).apply(view.points[kept])
-    spacing = math.sqrt(np.isfinite(view.depth).sum() / max(kept.sum(), 1))
-    size = spacing * content.distance / float(content.calibration.camera.K[0, 0])
-    return {"points": _base64(points.astype("<f4")), "size": size}
+def _surface(content: Content, index: int, view: SurfaceView, step: int) -> dict[str, str]:
+    points = content.first_from_surface(index).apply(view.points[_thinned(view, step)])
+    quads = _quads(view.points[::step, ::step])
+    return {"points": _base64(points.astype("<f4")), "quads": _base64(quads.astype("<u2"))}
+
+
+def _quads(points: Floats) -> NDArray[np.int64]:
+    """Return quadrilaterals (Q, 4) of points (H, W, 3), NaN = not seen; those seen are counted."""
+    seen = np.isfinite(points[..., 2])
+    number = np.cumsum(seen).reshape(seen.shape) - 1
+    rows, columns = seen.shape
+    corners = [
+        np.s_[i : rows - 1 + i, j : columns - 1 + j] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))
+    ]
+    distance = np.linalg.norm(points, axis=-1)
+    rays = points / distance[..., None]
+    ranges = np.stack([distance[c] for c in corners])
+    apart = np.linalg.norm(rays[corners[2]] - rays[corners[0]], axis=-1)
+    # Where a corner is missing the comparison is false.
+    kept = np.ptp(ranges, axis=0) < _STEEPEST * apart * ranges.min(0)
+    return np.stack([number[c][kept] for c in corners], -1)
 
 
 def _quantities(

@@ -31,7 +31,7 @@ from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.truth import load_truth
 from mitsuba_endo.show.view import view_surface
 from mitsuba_endo.show.web_images import map_pages
-from mitsuba_endo.show.web_scene import scene_canvas
+from mitsuba_endo.show.web_scene import _quads, scene_canvas
 
 Maker = Callable[..., Calibration]
 VERDICT = ["Focal length: 900 ± 0.82 px (95 %).", "Centre: not determined; x < y & more."]
@@ -245,6 +245,29 @@ def test_frusta_stand_where_the_solution_says(calibration: Calibration):
     pixels = calibration.camera.project(points)
     assert len(points) > 5000
     np.testing.assert_allclose(pixels, np.round(pixels), atol=1e-3)
+
+
+def test_patches_join_neighbouring_pixels(calibration: Calibration):
+    """Oracle: the camera's projection of their corners: squares of one size, once each."""
+    surface = _scene(_canvas(calibration))["surfaces"][0]
+    quads = np.frombuffer(base64.b64decode(surface["quads"]), "<u2").reshape(-1, 4)
+    corners = np.round(calibration.camera.project(_points(surface)))[quads]
+    step = corners[0, 2, 0] - corners[0, 0, 0]
+    around = step * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    np.testing.assert_array_equal(corners - corners[:, :1], np.broadcast_to(around, corners.shape))
+    assert len(np.unique(corners[:, 0], axis=0)) == len(quads)
+    assert len(quads) > 5000
+
+
+def test_patches_bridge_no_gap():
+    """Oracle: counted by hand: 4 x 5 squares, less 4 where the range jumps, less 4 at a hole."""
+    y, x = np.mgrid[:5, :6] / 100.0
+    points = np.stack([x, y, np.ones_like(x)], -1) * np.where(x > 0.025, 80.0, 50.0)[..., None]
+    points[1, 1] = np.nan
+    quads = _quads(points)
+    assert len(quads) == 20 - 4 - 4
+    seen = points[np.isfinite(points[..., 2])]
+    assert np.ptp(seen[quads][..., 2], axis=1).max() == 0
 
 
 def test_own_surfaces_stand_where_their_cameras_are(
