@@ -36,25 +36,24 @@ SETTLE = 10.0
 def main(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("docs/images"),
     result: Annotated[
-        Path | None, typer.Option(help="Only report and viewer, of this result.")
+        Path | None, typer.Option(help="Only the pictures of this result of the demo.")
     ] = None,
 ) -> None:
     """Run the demo and show its result; render every packaged scene."""
     out.mkdir(parents=True, exist_ok=True)
     if result is not None:
-        _pages(result, out)
+        _result(result, out)
         return
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
         command = [sys.executable, "-m", "mitsuba_endo.cli.main", "demo", "--out", str(demo)]
         subprocess.run([*command, "--quiet"], check=True)
-        overview = (demo / "solution" / "overview.png").read_bytes()
-        (out / "overview.png").write_bytes(overview)
-        _pages(demo / "solution", out)
+        _result(demo / "solution", out)
     _scenes(out)
 
 
-def _pages(result: Path, out: Path) -> None:
+def _result(result: Path, out: Path) -> None:
+    (out / "overview.png").write_bytes((result / "overview.png").read_bytes())
     if EXECUTABLE is None:
         print("no Chromium: report.png and viewer.png are left as they are")
         return
