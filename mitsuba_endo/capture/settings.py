@@ -34,7 +34,10 @@ class Tissue(Record):
     normal and leaves the geometry as it is."""
     subsurface: Literal["none", "blur", "medium"] = "blur"
     """Light inside the tissue: ``none``; ``blur``, a fast approximation on the image; ``medium``,
-    a participating medium under a rough dielectric boundary, exact and slow."""
+    a participating medium under a rough dielectric boundary. The medium is slow, and free of noise
+    with a thousand samples a pixel only. It returns 10 to 15 % less green and blue light than
+    ``blur`` and 25 to 30 % less red: its boundary reflects a share that ``blur`` lets in, and walks
+    end after 256 scatterings, which takes a sixth of the light where the albedo is 0.997."""
     mean_free_path: Positive = 0.25
     """Reduced (transport) mean free path in the tissue, mm."""
     seed: Annotated[int, Field(ge=0)] = 0

@@ -281,8 +281,8 @@ class PatternRanges(Section):
 
     variants: PositiveInt = 16
     """Different patterns in the dataset; each is drawn once and used by many samples."""
-    width: Annotated[int, Field(ge=2, le=8192)] = 480
-    """Pattern pixels."""
+    width: Annotated[int, Field(ge=2, le=8192)] = 384
+    """Pattern pixels; wider than columns x period leaves a band of stray light beside the grid."""
     height: Annotated[int, Field(ge=2, le=8192)] = 384
     columns: Count = fixed(32)
     rows: Count = fixed(32)
