@@ -15,7 +15,7 @@ import typer
 from reproduce import peers
 from reproduce.bound import calibration_bound
 from reproduce.capture import capture
-from reproduce.command import OUT, Out, Quick
+from reproduce.command import OUT, Out, Quick, need
 from reproduce.decoder_noise import Plain
 from reproduce.guarded import answer, solvers
 from reproduce.peer_errors import calibration_errors, lit_points, point_error
@@ -37,6 +37,7 @@ LAWS = ("pinhole", "direction_cosine")
 
 def main(out: Out = OUT / "peers", quick: Quick = False) -> None:
     """Let every peer solve all captures, one after the other in a process of its own."""
+    need("pycolmap")
     seeds, width = (2, 48) if quick else (5, 140)
     noise = Plain(sigma=0.3, outliers=0.01)
     truths, captures = {}, {}

@@ -16,7 +16,7 @@ import numpy as np
 import typer
 from matplotlib.figure import Figure
 from reproduce.capture import decoded
-from reproduce.command import OUT, Out, Quick, Workers
+from reproduce.command import OUT, Out, Quick, Workers, need
 from reproduce.errors import Seen, rms_where_all_see, seen, shape_errors
 from reproduce.guarded import answer, solvers
 from reproduce.methods import independent, joint, one_projector
@@ -33,6 +33,7 @@ PLAY = 0.2
 
 def main(out: Out = OUT / "per_frame", quick: Quick = False, workers: Workers = 2) -> None:
     """Compare the three over seeds."""
+    need("open3d", "small_gicp")
     seeds, frames, width = (1, 2, 96) if quick else (10, 5, 200)
     errors: dict[str, list[list[float]]] = {name: [] for name in METHODS}
     views: dict[str, Seen] = {}

@@ -15,7 +15,7 @@ import numpy as np
 import typer
 from reproduce import peers
 from reproduce.capture import Truth
-from reproduce.command import OUT, Out, Quick, Workers
+from reproduce.command import OUT, Out, Quick, Workers, need
 from reproduce.conditions import CURVES, Condition
 from reproduce.decoder_noise import Plain
 from reproduce.guarded import answer, solvers
@@ -34,6 +34,7 @@ TITLES = ("focal error (%)", "distance of the points (mm)")
 
 def main(out: Out = OUT / "robustness", quick: Quick = False, workers: Workers = 2) -> None:
     """Draw all curves."""
+    need("pycolmap")
     seeds, width, length = (1, 48, 2) if quick else (3, 96, None)
     rows = []
     with solvers(workers) as pool:

@@ -100,5 +100,5 @@ def clouds_picture(clouds: dict[str, Floats], truth: Truth) -> Figure:
     axes[1, 0].set_ylabel("z (mm)")
     axes[0, 0].set_xlim(-40, 40)
     axes[0, 0].set_ylim(40, -40)
-    axes[1, 0].set_ylim(40, 120)
+    axes[1, 0].set_ylim(30, 110)
     return figure

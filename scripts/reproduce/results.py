@@ -4,6 +4,8 @@ import csv
 import shutil
 from pathlib import Path
 
+import numpy as np
+
 from mitsuba_endo.files import atomic_path
 
 from .tables import Row, markdown
@@ -17,6 +19,17 @@ solvers run in processes that are refused every file of the truth. Values with a
 median (lowest to highest) over seeds that were not used to choose any setting.
 
 """
+
+
+COMPARED = {
+    "peers": (
+        ("law",),
+        ("focal (%)", "rotation (deg)", "direction (deg)", "points (mm)", "time (s)",
+         "memory (MB)"),
+    ),
+    "robustness": (("against", "value"), ("focal error (%)", "distance of the points (mm)")),
+}  # fmt: skip
+"""Of experiments with peers: the columns that name a condition, and the figures, less is better."""
 
 
 def write_results(page: Path, done: dict[str, tuple[str, Path]]) -> None:
@@ -42,8 +55,40 @@ def write_results(page: Path, done: dict[str, tuple[str, Path]]) -> None:
             parts.append(f"![{picture.stem}](images/results_{picture.name})\n")
         targets += _targets(name, out)
     head = "## Targets\n\n" + markdown(targets) + "\n" if targets else ""
+    worse = _better_peers(done)
+    if worse:
+        head += f"## Where a peer does better\n\n{markdown(worse)}\n"
     with atomic_path(page) as aside:
         aside.write_text(INTRO + head + "\n".join(parts), encoding="utf-8")
+
+
+def _better_peers(done: dict[str, tuple[str, Path]]) -> list[Row]:
+    """Return every figure in which a peer beats ours by more than a twentieth."""
+    rows = []
+    for name, (condition, figures) in COMPARED.items():
+        if name not in done:
+            continue
+        with (done[name][1] / f"{name}.csv").open(newline="") as file:
+            table = list(csv.DictReader(file))
+        for at in dict.fromkeys(tuple(row[c] for c in condition) for row in table):
+            group = [row for row in table if tuple(row[c] for c in condition) == at]
+            rows += [
+                {"experiment": name, "at": " ".join(at), "figure": figure, **found}
+                for figure in figures
+                if (found := _better(group, figure))
+            ]
+    return rows
+
+
+def _better(group: list[dict[str, str]], figure: str) -> Row:
+    """Return the best peer's value beside ours; nothing if ours is as good."""
+    known = {row["method"]: float(row[figure] or "nan") for row in group}
+    ours = known.pop("ours")
+    peers = {method: value for method, value in known.items() if np.isfinite(value)}
+    if not peers or min(peers.values()) > 0.95 * ours:
+        return {}
+    best = min(peers, key=lambda method: peers[method])
+    return {"ours": ours, "best peer": best, "its": peers[best]}
 
 
 def _targets(name: str, out: Path) -> list[Row]:
