@@ -37,12 +37,19 @@ def solution_table(solution: "Solution") -> "Table":
         ("focal", "pattern px"), ("centre", "pattern px"), ("aspect", "fy/fx"), ("distortion", ""),
     ):  # fmt: skip
         _estimate_rows(table, name, getattr(projector, name), unit)
-    for frame in solution.frames:
+    for i, frame in enumerate(solution.frames):
         table.add_section()
         table.add_row(Text(frame.name, style="bold"), "", "", "", "")
         if frame.focal is not None:
             _estimate_rows(table, "focal", frame.focal, "pattern px")
-        _pose_rows(table, frame.projector_from_camera, solution.units, len(solution.frames) > 1)
+        pose = frame.projector_from_camera
+        _pose_rows(table, pose, solution.units, len(solution.frames) > 1)
+        transform = pose.to_transform()
+        if transform is not None:
+            given = i == 0 and solution.scale in ("baseline", "up_to_scale")
+            status = "fixed" if given else pose.status
+            length = f"{np.linalg.norm(transform.t):.5g}"
+            table.add_row("baseline", length, "", solution.units, status)
         if frame.rms_px is not None:
             used = "" if frame.used is None else f"{frame.used} pixels"
             table.add_row("residual RMS", f"{frame.rms_px:.3f}", "", "pattern px", used)
@@ -77,7 +84,6 @@ def _pose_rows(table: "Table", pose: "PoseEstimate", unit: str, short: bool) -> 
         for axis, value, s in zip("xyz", transform.t.tolist(), std[3:], strict=True):
             name = f"projector translation {axis}"
             table.add_row(name, numbers(value, 5), numbers(s, 2), unit, pose.status)
-    table.add_row("baseline", f"{np.linalg.norm(transform.t):.5g}", "", unit, pose.status)
 
 
 def _rotation_degrees(R: np.ndarray) -> list[float]:

@@ -1,32 +1,25 @@
 """Parts of ``calibrate`` that need no solver."""
 
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from mitsuba_endo.cli.calibrate import exit_code, load_input, with_sharing
+from mitsuba_endo.cli.summary import solution_table
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.records.solution import Outcome, Solution
 from tests.cli.inputs import q, rig, write
 
 
-@pytest.mark.parametrize(
-    ("outcome", "code"),
-    [
-        (Outcome.CONVERGED, 0),
-        (Outcome.MAX_ITERATIONS, 1),
-        (Outcome.STALLED, 1),
-        (Outcome.INTERRUPTED, 130),
-    ],
-)
-def test_exit_code(outcome: Outcome, code: int):
-    """Oracle: the table of exit codes in the help."""
-    solution = Solution.model_validate(
+def _solution(outcome: Outcome, scale: str) -> Solution:
+    return Solution.model_validate(
         {
             "outcome": outcome,
             "units": "mm",
-            "scale": "baseline",
+            "scale": scale,
             "projector": {
                 "law": "pinhole",
                 "focal": {"value": 1, "status": "measured"},
@@ -41,7 +34,33 @@ def test_exit_code(outcome: Outcome, code: int):
             ],
         }
     )
+
+
+@pytest.mark.parametrize(
+    ("outcome", "code"),
+    [
+        (Outcome.CONVERGED, 0),
+        (Outcome.MAX_ITERATIONS, 1),
+        (Outcome.STALLED, 1),
+        (Outcome.INTERRUPTED, 130),
+    ],
+)
+def test_exit_code(outcome: Outcome, code: int):
+    """Oracle: the table of exit codes in the help."""
+    solution = _solution(outcome, "baseline")
     assert exit_code(solution) == code
+
+
+@pytest.mark.parametrize(
+    ("scale", "status"), [("baseline", "fixed"), ("known_distance", "measured")]
+)
+def test_given_baseline_is_not_called_measured(scale: str, status: str):
+    """Oracle: the solution's scale says what was given."""
+    console = Console(file=StringIO(), width=100)
+    console.print(solution_table(_solution(Outcome.CONVERGED, scale)))
+    assert isinstance(console.file, StringIO)
+    row = next(line for line in console.file.getvalue().splitlines() if "baseline" in line)
+    assert status in row
 
 
 def test_share_changes_only_what_it_names():
