@@ -18,6 +18,8 @@ class GridGraph:
 
     nodes: Nodes
     links: Links
+    loose: Links
+    """Links in no closed quad: they join no component."""
     component: NDArray[np.intp]
     """(N,) number of the node's component, -1 for nodes without links."""
     place: NDArray[np.intp]
@@ -28,12 +30,13 @@ def build_graph(heads: Heads) -> GridGraph:
     """Return the graph of an image."""
     nodes = find_nodes(heads)
     links = find_links(nodes, heads)
-    links = links.chosen(in_quad(links, len(nodes)))
+    closed = in_quad(links, len(nodes))
+    links, loose = links.chosen(closed), links.chosen(~closed)
     component = components(links, len(nodes))
     place = _places(links, component)
     fits = (place[links.end] - place[links.start] == links.step).all(1)
     # A component that closes only by links that contradict each other loses them.
-    return GridGraph(nodes, links.chosen(fits), component, place)
+    return GridGraph(nodes, links.chosen(fits), loose, component, place)
 
 
 def in_quad(links: Links, count: int) -> NDArray[np.bool_]:

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from .beside import vote_beside
 from .graph import GridGraph, components
+from .identity import Identity
 from .links import Links
+from .pendants import with_pendants
 from .potts import cut
 from .vote import Placement, Vote, evidence, scores_at, vote
 from .windows import candidates
@@ -38,20 +40,6 @@ WEAKEST = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Identity:
-    """The nodes' places in the pattern."""
-
-    placed: NDArray[np.bool_]
-    """(N,) nodes that were identified."""
-    node: NDArray[np.intp]
-    """(N, 2) column and row in the pattern, -1 where not placed."""
-    turn: int
-    """1 if the pattern is seen upright, -1 upside down."""
-    read: float
-    """Share of the placed nodes whose most probable code is that of the pattern, 0 if none."""
-
-
-@dataclass(frozen=True, eq=False)
 class _Part:
     members: NDArray[np.intp]
     """Nodes of one part of a component."""
@@ -78,7 +66,8 @@ def identify(graph: GridGraph, pattern: NDArray[np.int8]) -> Identity:
             parts += _accepted(found, MIN_SHARE * len(members))
     parts = _accepted(_same_way_up(parts), MIN_SHARE_OF_ALL * tried)
     parts += _beside(graph, parts, logs, pattern)
-    return _without_doubles(graph, parts, logs, pattern)
+    identity = _without_doubles(graph, parts, logs, pattern)
+    return with_pendants(graph, identity, logs, pattern)
 
 
 def _parts(

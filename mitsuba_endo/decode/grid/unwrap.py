@@ -6,10 +6,11 @@ from numpy.typing import NDArray
 
 from .cells import Cells, find_cells
 from .heads import Heads
-from .identify import Identity
+from .identity import Identity
 from .nodes import Nodes, larger, phase_slope
+from .planes import drawn_to_planes
 
-MIN_CONFIDENCE = 0.5
+MIN_CONFIDENCE = 0.45
 MAX_EDGE = 0.8
 ROUNDS = 2
 """Cells without a node of their own are reached from placed ones in so many steps."""
@@ -40,7 +41,8 @@ def unwrap(heads: Heads, nodes: Nodes, identity: Identity) -> NDArray[np.float32
     known = (place[:, 0] != UNKNOWN)[cells.number] & usable
     known &= ~_contradicted(cells, place)
     lattice = identity.turn * (place[cells.number] + heads.phase)
-    return np.where(known[..., None], lattice, np.nan).astype(np.float32)
+    lattice = np.where(known[..., None], lattice, np.nan).astype(np.float32)
+    return drawn_to_planes(lattice, heads.confidence)
 
 
 def _of_nodes(

@@ -1,0 +1,55 @@
+"""Nodes that a single link joins to placed ones, in a graph drawn by hand."""
+
+import numpy as np
+
+from mitsuba_endo.decode.gap_code import gap_code
+from mitsuba_endo.decode.grid.graph import GridGraph
+from mitsuba_endo.decode.grid.identity import Identity
+from mitsuba_endo.decode.grid.links import Links
+from mitsuba_endo.decode.grid.nodes import Nodes
+from mitsuba_endo.decode.grid.pendants import with_pendants
+from mitsuba_endo.decode.grid.vote import evidence
+
+PATTERN = gap_code(12, 10)
+TRUE = np.array([[4, 5], [5, 5], [4, 6], [5, 6], [6, 6], [7, 6], [4, 7]])
+"""Column and row: a quad, two nodes in a row to the right of it, one below it."""
+QUAD = 4
+LOOSE = np.array([[3, 4, 0], [4, 5, 0], [2, 6, 1]])
+"""Start, end, axis."""
+
+
+def placed(misread: int | None = None, quality: float = 0.9, turn: int = 1) -> Identity:
+    """Return who is placed, where one node's code may be misread."""
+    true = TRUE if turn == 1 else np.array(PATTERN.shape[::-1]) - 1 - TRUE
+    code = 1 - PATTERN[true[:, 1], true[:, 0]]
+    if misread is not None:
+        code[misread] = (code[misread] + 1) % 3
+    probable = np.full((len(TRUE), 3), 0.05)
+    probable[np.arange(len(TRUE)), code] = 0.9
+    nodes = Nodes(10.0 * TRUE, np.tile(np.eye(2) / 10, (len(TRUE), 1, 1)), probable)
+    start, end, axis = LOOSE.T
+    loose = Links(start, end, axis, np.full(len(LOOSE), quality))
+    none = loose.chosen(np.zeros(len(loose), bool))
+    inside = np.arange(len(TRUE)) < QUAD
+    graph = GridGraph(nodes, none, loose, np.where(inside, 0, -1), TRUE)
+    known = Identity(inside, np.where(inside[:, None], true, -1), turn, 1.0)
+    return with_pendants(graph, known, evidence(probable), PATTERN)
+
+
+def test_right_codes():
+    """Oracle: the places by which the codes were written, upright and upside down."""
+    for turn in (1, -1):
+        found = placed(turn=turn)
+        assert found.placed.all()
+        true = TRUE if turn == 1 else np.array(PATTERN.shape[::-1]) - 1 - TRUE
+        np.testing.assert_array_equal(found.node, true)
+
+
+def test_a_wrong_code_ends_the_chain():
+    """Oracle: by hand; the node behind the misread one is reached by no other link."""
+    np.testing.assert_array_equal(placed(misread=4).placed, [1, 1, 1, 1, 0, 0, 1])
+
+
+def test_poor_links_lead_nowhere():
+    """Oracle: by hand."""
+    np.testing.assert_array_equal(placed(quality=0.3).placed, np.arange(7) < QUAD)
