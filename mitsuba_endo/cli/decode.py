@@ -189,7 +189,7 @@ def _sized(frames: "Iterator[Frame]", rig: "Rig") -> "Iterator[Frame]":
 def _write(folder: Path, frame: "Frame", result: "DecodedGrid") -> None:
     import cv2
 
-    from ..records.correspondence import CHANNELS, write_exr
+    from ..records.correspondence import WEIGHT, save_map
     from ..show.grid_picture import grid_picture
 
     picture = grid_picture(frame.image, result)
@@ -198,8 +198,8 @@ def _write(folder: Path, frame: "Frame", result: "DecodedGrid") -> None:
         raise OSError("the picture was not written")
     if result.reason:
         return
-    channels = {name: result.q[..., i] for i, name in enumerate(CHANNELS)}
-    write_exr(map_path(folder, frame.name), channels | {"confidence": result.confidence})
+    further = {"confidence": result.confidence, WEIGHT: result.weight}
+    save_map(map_path(folder, frame.name), result.q, further)
 
 
 def _fields(one: Summary) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from ..errors import InputError
 from ..files import atomic_path
 
 CHANNELS = ("projector.x", "projector.y")
+WEIGHT = "weight"
+"""Optional third channel of an EXR file, or array of an npz file."""
 SUFFIXES = (".exr", ".npz")
 
 
@@ -24,6 +26,9 @@ class CorrespondenceMap:
     """(H, W, 2) pattern pixels (x, y), integer = pixel centre, NaN = missing."""
     name: str
     """How the frame is called in results, usually its file name."""
+    weight: NDArray[np.float32] | None = None
+    """(H, W) how well each coordinate is known: 1 / variance relative to the best, in (0, 1]. None:
+    all alike."""
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -34,6 +39,8 @@ class CorrespondenceMap:
 def load_map(path: str | Path) -> CorrespondenceMap:
     """Read a map from OpenEXR (channels projector.x, projector.y) or npz (array ``map``).
 
+    A channel or array ``weight`` is optional; where it is not above zero, nothing is known.
+
     Raises:
         InputError: missing file, missing channels, wrong shape, nothing finite, wrong units.
     """
@@ -41,13 +48,27 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     if not path.is_file():
         raise InputError("no such file", str(path), "check the path")
     check_map_path(path)
-    q = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
+    q, weight = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
+    known = np.asarray(np.isfinite(q).all(-1))
+    if weight is not None:
+        _check_weight(weight, q, str(path))
+        known &= weight > 0
+    q = np.where(known[..., None], q, np.float32(np.nan))
     _check(q, str(path))
-    return CorrespondenceMap(np.where(np.isfinite(q).all(-1, keepdims=True), q, np.nan), path.name)
+    return CorrespondenceMap(q, path.name, weight)
 
 
-def save_map(path: str | Path, q: NDArray[np.floating]) -> None:
+def save_map(
+    path: str | Path,
+    q: NDArray[np.floating],
+    further: dict[str, NDArray[np.floating]] | None = None,
+) -> None:
     """Write an (H, W, 2) map as OpenEXR or npz, by the suffix of ``path``.
+
+    Args:
+        path: .exr or .npz.
+        q: pattern pixels, NaN = missing.
+        further: more channels (H, W) by name, e.g. ``weight``, see :class:`CorrespondenceMap`.
 
     Raises:
         InputError: another suffix, or the folder cannot be written.
@@ -57,9 +78,9 @@ def save_map(path: str | Path, q: NDArray[np.floating]) -> None:
     if Path(path).suffix.lower() == ".npz":
         # An open file, because NumPy appends its own suffix to names that end in .NPZ.
         with atomic_path(path) as aside, aside.open("wb") as file:
-            np.savez_compressed(file, map=q)
+            np.savez_compressed(file, allow_pickle=False, map=q, **(further or {}))
         return
-    write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)})
+    write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)} | (further or {}))
 
 
 def write_exr(path: str | Path, channels: dict[str, NDArray[np.floating]]) -> None:
@@ -104,17 +125,21 @@ def check_map_path(path: Path) -> None:
         )
 
 
-def _read_exr(path: Path) -> NDArray[np.float32]:
+_Read = tuple[NDArray[np.float32], NDArray[np.float32] | None]
+"""Coordinates (H, W, 2) and, if the file has them, weights."""
+
+
+def _read_exr(path: Path) -> _Read:
     channels = read_exr(path)
     missing = [name for name in CHANNELS if name not in channels]
     if missing:
         raise InputError(
             f"channel {missing[0]} is missing", str(path), f"name them {' and '.join(CHANNELS)}"
         )
-    return np.stack([channels[name] for name in CHANNELS], -1)
+    return np.stack([channels[name] for name in CHANNELS], -1), channels.get(WEIGHT)
 
 
-def _read_npz(path: Path) -> NDArray[np.float32]:
+def _read_npz(path: Path) -> _Read:
     try:
         with path.open("rb") as file:  # NumPy itself leaves a damaged file open
             data = np.load(file, allow_pickle=False)
@@ -123,6 +148,7 @@ def _read_npz(path: Path) -> NDArray[np.float32]:
             if "map" not in data:
                 raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
             q = np.asarray(data["map"])
+            weight = np.asarray(data[WEIGHT], np.float32) if WEIGHT in data else None
     except InputError:
         raise
     except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
@@ -132,7 +158,21 @@ def _read_npz(path: Path) -> NDArray[np.float32]:
             f"array 'map' is {q.dtype} {'x'.join(map(str, q.shape))}", str(path),
             "store projector x and y as numbers, HxWx2",
         )  # fmt: skip
-    return q.astype(np.float32)
+    return q.astype(np.float32), weight
+
+
+def _check_weight(weight: NDArray[np.float32], q: NDArray[np.float32], source: str) -> None:
+    if weight.shape != q.shape[:2]:
+        raise InputError(
+            f"weight has shape {weight.shape} and the map {q.shape[:2]}", source,
+            "give one weight for each pixel",
+        )  # fmt: skip
+    known = weight[np.isfinite(weight)]
+    if known.size and not (known.min() >= 0 and known.max() <= 1):
+        raise InputError(
+            f"weights reach from {known.min():g} to {known.max():g}", source,
+            "divide 1 / variance by its largest value, so that weights lie between 0 and 1",
+        )  # fmt: skip
 
 
 def _check(q: NDArray[np.float32], source: str) -> None:

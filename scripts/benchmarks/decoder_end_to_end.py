@@ -1,6 +1,7 @@
 """Four photographs of a scene, decoded and calibrated, against true maps with the same noise."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -55,12 +56,13 @@ def shoot_frames(kind: Kind, seed: int, quick: bool) -> tuple[Mesh, list[Shot]]:
 
 def judge(kind: Kind, mesh: Mesh, shots: Sequence[Shot], network: Network) -> list[Figure]:
     """Return the errors of the calibration from images, and from maps with the same noise."""
-    decoded = [decode_image(shot.image(False, k)[0], network, PATTERN).q
+    decoded = [decode_image(shot.image(False, k)[0], network, PATTERN)
                for k, shot in enumerate(shots)]  # fmt: skip
-    noise = float(np.median([_noise(q, shot) for q, shot in zip(decoded, shots, strict=True)]))
+    read = [CorrespondenceMap(d.q, "", d.weight) for d in decoded]
+    noise = float(np.median([_noise(m.q, shot) for m, shot in zip(read, shots, strict=True)]))
     white, alike = ([_noisy(shot, noise, spread, seed) for seed, shot in enumerate(shots)]
                     for spread in (0.0, CORRELATION_PX))  # fmt: skip
-    focal, shape, frames = _calibrated(mesh, shots, decoded)
+    focal, shape, frames = _calibrated(mesh, shots, read)
     ideal, matched = (_calibrated(mesh, shots, maps)[1] for maps in (white, alike))
     return [
         _figure(
@@ -83,16 +85,16 @@ def _noise(q: NDArray[np.float32], shot: Shot) -> float:
     return 1.4826 * float(np.median(np.abs(error)))
 
 
-def _noisy(shot: Shot, noise: float, spread: float, seed: int) -> NDArray[np.float32]:
+def _noisy(shot: Shot, noise: float, spread: float, seed: int) -> CorrespondenceMap:
     """Return true coordinates of the lit pixels with Gaussian noise, smoothed over ``spread``."""
     q = np.where(shot.lattice_known[..., None], shot.q, np.nan)
     rng = np.random.default_rng((seed, 4))
     error = gaussian_filter(rng.standard_normal(q.shape), (spread, spread, 0))
-    return (q + noise * error / error.std()).astype(np.float32)
+    return CorrespondenceMap((q + noise * error / error.std()).astype(np.float32), "")
 
 
 def _calibrated(
-    mesh: Mesh, shots: Sequence[Shot], maps: Sequence[NDArray[np.float32]]
+    mesh: Mesh, shots: Sequence[Shot], maps: Sequence[CorrespondenceMap]
 ) -> tuple[float, float, int]:
     """Return the focal length's error, %, the shape's RMSE, mm, and the frames used."""
     rig = Rig(
@@ -102,7 +104,7 @@ def _calibrated(
         ),
         scale=Scale(baseline=float(np.linalg.norm(shots[0].projector_from_camera.t))),
     )
-    named = [CorrespondenceMap(q, f"frame {k}") for k, q in enumerate(maps)]
+    named = [replace(m, name=f"frame {k}") for k, m in enumerate(maps)]
     found = calibrate(named, rig)
     focal = found.solution.projector.focal.value
     error = 100 * abs(focal / FOCAL - 1) if isinstance(focal, float) else np.inf

@@ -41,6 +41,22 @@ def test_exr_channels_are_named_and_not_swapped(tmp_path: Path):
     np.testing.assert_array_equal(channels["projector.y"], _q()[..., 1])
 
 
+@pytest.mark.parametrize("name", ["m.exr", "m.npz"])
+def test_weights_are_read_and_none_is_known_without_one(tmp_path: Path, name: str):
+    """Oracle: the weights written; a coordinate of weight zero or NaN is missing."""
+    q = _q()
+    weight = np.linspace(0.1, 1, q[..., 0].size, dtype=np.float32).reshape(q.shape[:2])
+    weight[1, 2], weight[3, 4] = 0, np.nan
+    save_map(tmp_path / name, q, {"weight": weight})
+    map_ = load_map(tmp_path / name)
+    assert map_.weight is not None
+    np.testing.assert_array_equal(map_.weight, weight)
+    assert not map_.valid[1, 2]
+    assert not map_.valid[3, 4]
+    expected = np.isfinite(q).all(-1) & (weight > 0)
+    np.testing.assert_array_equal(map_.valid, expected)
+
+
 def test_missing_if_either_coordinate_is(tmp_path: Path):
     """Oracle: a correspondence is a pair, infinity is as missing as NaN."""
     q = _q()
@@ -111,6 +127,8 @@ def _one_channel(path: Path) -> Path:
         (_truncated, "m.exr", "is not a readable OpenEXR file"),
         (_text, "m.exr", "is not a readable OpenEXR file"),
         (_one_channel, "m.exr", "channel projector.y is missing"),
+        (lambda p: _npz(p, map=_q(), weight=_q()), "m.npz", "weight has shape (5, 9, 2)"),
+        (lambda p: _npz(p, map=_q(), weight=4 * np.ones((5, 9))), "m.npz", "from 4 to 4; divide"),
         (lambda p: _npz(p, map=_q() * np.nan), "m.npz", "the map has no finite value"),
         (lambda p: _npz(p, map=_q() / 1000 % 1), "m.npz", "lie between 0 and 1; give them in"),
     ],

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.solve.prepare.initial import (
     MAX_VERTICES,
     PER_VERTEX,
@@ -22,7 +23,7 @@ def test_observations_keep_pixels_rays_and_coordinates_together():
     rig = small_rig("pinhole")
     used = np.isfinite(rig.q[..., 0])
     used[:, ::3] = False
-    frame = observations("a", rig.q.astype(np.float32), used, rig.camera)
+    frame = observations(CorrespondenceMap(rig.q.astype(np.float32), "a"), used, rig.camera)
     assert frame.shape == (80, 96)
     assert len(frame.rays) == used.sum()
     np.testing.assert_allclose(rig.camera.project(frame.rays), frame.pixels, atol=1e-6)
@@ -34,7 +35,7 @@ class TestCellSize:
     def frame(self, part: np.ndarray):
         camera = lopsided_camera(200, 120)
         q = np.zeros((120, 200, 2), np.float32)
-        return observations("a", q, part, camera), camera
+        return observations(CorrespondenceMap(q, "a"), part, camera), camera
 
     def test_of_a_full_map(self):
         """Oracle: nine pixels a vertex make cells of three pixels."""
@@ -58,7 +59,9 @@ class TestCellSize:
         """Oracle: the number of vertices of a map too large for nine pixels each."""
         camera = lopsided_camera(600, 400)
         part = np.ones((400, 600), bool)
-        frame = observations("a", np.zeros((400, 600, 2), np.float32), part, camera)
+        frame = observations(
+            CorrespondenceMap(np.zeros((400, 600, 2), np.float32), "a"), part, camera
+        )
         assert part.sum() / PER_VERTEX > MAX_VERTICES
         cell = cell_size(frame, camera, None) / pixel_angle(camera)
         assert part.sum() / cell**2 == pytest.approx(MAX_VERTICES, rel=0.02)
@@ -94,7 +97,7 @@ def test_smooth_samples_follow_the_pixels():
     """Oracle: the depth image at the pixels, since a median keeps a constant."""
     rig = small_rig("pinhole")
     used = np.isfinite(rig.q[..., 0])
-    frame = observations("a", rig.q.astype(np.float32), used, rig.camera)
+    frame = observations(CorrespondenceMap(rig.q.astype(np.float32), "a"), used, rig.camera)
     depth = np.where(np.arange(96) < 48, 10.0, 20.0) * np.ones((80, 1))
     rays, ranges = smooth_samples(depth, frame)
     np.testing.assert_array_equal(rays, frame.rays)

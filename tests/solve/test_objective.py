@@ -1,5 +1,7 @@
 """The objective: its gradient, its scale, and pixels that see nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,13 @@ class TestGradient:
         """Oracle: central differences of the cost; the normal equations' right-hand side."""
         rig = with_outliers(with_noise(small_rig(law), 0.3, 0), 0.05, 1)
         self.check(*problem_of([rig]), stage)
+
+    def test_of_observations_known_unequally_well(self, stage: int):
+        """Oracle: as above, with weights."""
+        built, state = problem_of([with_noise(small_rig("pinhole"), 0.3, 0)])
+        weight = np.random.default_rng(7).uniform(0.02, 1.0, built.frames[0].count)
+        built.frames[0] = replace(built.frames[0], weight=weight)
+        self.check(built, state, stage)
 
     def test_of_two_frames(self, stage: int):
         """Oracle: as above, two surfaces, one pose, an unknown centre."""

@@ -17,6 +17,8 @@ from .unwrap import unwrap
 
 FEW_NODES = 9
 """With fewer, an image shows no grid."""
+SURE = 1e-3
+"""Doubt, one less the confidence, under which coordinates are no better known."""
 DARK = 8 / 255
 """An image whose brightest hundredth is below that is called dark."""
 SATURATED = 254.5 / 255
@@ -34,6 +36,17 @@ class DecodedGrid:
     identity: Identity
     reason: str
     """Why nothing was decoded; empty if something was."""
+
+    @property
+    def weight(self) -> NDArray[np.float32]:
+        """(H, W) 1 / variance of the coordinate relative to the best, 0 = not known.
+
+        The standard deviation grows with the cube root of the doubt: on the training's validation
+        views it is 0.10, 0.16, 0.22, 0.34, 0.55 and 0.9 pattern pixels at doubts of 0.001, 0.004,
+        0.01, 0.035, 0.15 and 0.4, in clean and in heavily corrupted images alike.
+        """
+        doubt = np.maximum(1 - self.confidence, SURE)
+        return np.where(self.confidence > 0, (SURE / doubt) ** (2 / 3), 0).astype(np.float32)
 
     @property
     def coverage(self) -> float:

@@ -6,7 +6,7 @@ u and one for v give every pixel's row of the Jacobian. No derivative is written
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -59,6 +59,12 @@ class Linearisation:
     """(2, 3, N) derivatives with respect to the inverse ranges of these vertices."""
     J_local: NDArray[np.float64]
     """(2, L, N) derivatives with respect to the frame's active blocks, in the plan's order."""
+
+    def scaled(self, factor: NDArray[np.float64] | float) -> "Linearisation":
+        """Return the model whose derivatives are multiplied by a factor (N,) of each pixel."""
+        if isinstance(factor, float) and factor == 1:
+            return self
+        return replace(self, J_surface=factor * self.J_surface, J_local=factor * self.J_local)
 
     @cached_property
     def triangles(self) -> NDArray[np.int64]:
@@ -129,9 +135,10 @@ class FrameRenderer:
         active: Sequence[str],
         terms: int,
         q: NDArray[np.float64],
+        weight: NDArray[np.float64] | None,
         loss: Callable[[Any], Any],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the gradient of sum loss(|R - q|^2) over the hits by one backward pass.
+        """Return the gradient of sum loss(weight |R - q|^2) over the hits by one backward pass.
 
         Args:
             state: where.
@@ -140,6 +147,7 @@ class FrameRenderer:
             active: its blocks of unknowns.
             terms: number of distortion coefficients that are unknowns.
             q: (2, N) observed coordinates.
+            weight: (N,) of the observations; None = all alike.
             loss: of squared residuals, on Dr.Jit arrays.
 
         Returns:
@@ -150,7 +158,10 @@ class FrameRenderer:
             state, frame, surface, lanes[:3], _split(lanes[3:], widths)
         )
         du, dv = u - mi.Float64(q[0]), v - mi.Float64(q[1])
-        dr.backward(dr.select(hit, loss(du * du + dv * dv), 0.0))
+        r2 = du * du + dv * dv
+        if weight is not None:
+            r2 = r2 * mi.Float64(weight)
+        dr.backward(dr.select(hit, loss(r2), 0.0))
         columns = [dr.grad(lane) for lane in lanes]
         dr.eval(columns, face)
         # Summed afterwards: ten times faster than adding all pixels to one number in the kernel.

@@ -34,7 +34,7 @@ class Evaluation:
     faces: list[NDArray[np.uint32]]
     """(N,) triangle of the lattice that each pixel sees, any where it misses."""
     residuals: list[NDArray[np.float64]]
-    """(2, N) rendered minus observed, zero where missed."""
+    """(2, N) rendered minus observed, whitened, zero where missed."""
     _only: list[Linearisation] = field(default_factory=list)
 
     @property
@@ -43,20 +43,24 @@ class Evaluation:
         return (self.linearisation(k) for k in range(len(self.hits)))
 
     def linearisation(self, frame: int) -> Linearisation:
-        """Return the derivatives of one frame; those of an only frame are kept."""
+        """Return the whitened derivatives of one frame; those of an only frame are kept."""
         if self._only:
             return self._only[0]
         plan = self.problem.plan
         self.problem.move_surfaces(self.state)
-        lin = self.problem.renderers[frame].linearise(
-            self.state, frame, plan.surface_of(frame), plan.active(frame), plan.distortion_terms
+        lin = (
+            self.problem.renderers[frame]
+            .linearise(
+                self.state, frame, plan.surface_of(frame), plan.active(frame), plan.distortion_terms
+            )
+            .scaled(self.problem.frames[frame].whitening)
         )
         if plan.frames == 1:
             self._only.append(lin)
         return lin
 
     def squared(self, frame: int) -> NDArray[np.float64]:
-        """(N,) squared residuals of a frame, NaN where missed."""
+        """(N,) squared whitened residuals of a frame, NaN where missed."""
         r2 = (self.residuals[frame] ** 2).sum(0)
         return np.where(self.hits[frame], r2, np.nan)
 
@@ -172,12 +176,12 @@ def evaluate(problem: Problem, state: State) -> Evaluation:
         q, _, faces, hit = renderer.render(state, k, problem.plan.surface_of(k))
         at.hits.append(hit)
         at.faces.append(faces)
-        at.residuals.append(np.where(hit, q - frame.q, 0.0))
+        at.residuals.append(np.where(hit, frame.whitening * (q - frame.q), 0.0))
     return at
 
 
 def estimate_noise(at: Evaluation) -> float:
-    """Return the robust standard deviation of one residual component, pattern pixels."""
+    """Return the robust standard deviation of a best observation's component, pattern pixels."""
     r2 = np.concatenate([at.squared(k) for k in range(len(at.residuals))])
     r2 = r2[np.isfinite(r2)]
     if not len(r2):

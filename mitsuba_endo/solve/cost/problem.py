@@ -27,6 +27,13 @@ class Observations:
     """(2, N) observed projector coordinates, pattern pixels."""
     pixels: NDArray[np.int32]
     """(N, 2) image position (x, y) of every observation."""
+    weight: NDArray[np.float64] | None = None
+    """(N,) 1 / variance relative to the best observation; None = all alike."""
+
+    @property
+    def whitening(self) -> NDArray[np.float64] | float:
+        """(N,) factor that gives every residual the noise of the best observation."""
+        return 1.0 if self.weight is None else np.sqrt(self.weight)
 
     @property
     def count(self) -> int:

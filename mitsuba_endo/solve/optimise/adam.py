@@ -169,7 +169,7 @@ def gradient(
     for k, (frame, renderer) in enumerate(zip(problem.frames, problem.renderers, strict=True)):
         s = plan.surface_of(k)
         d_rho, d_local = renderer.cost_gradient(
-            state, k, s, plan.active(k), plan.distortion_terms, frame.q,
+            state, k, s, plan.active(k), plan.distortion_terms, frame.q, frame.weight,
             lambda r2: objective.loss(r2, objective.scale, lambda x: dr.log(1 + x)),
         )  # fmt: skip
         surfaces[s] += d_rho

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
+from ...records.correspondence import CorrespondenceMap
 from ...start.triangulate import smooth_depth
 from ..cost.problem import Observations
 from ..unknowns.lattice import Lattice
@@ -17,12 +18,13 @@ _BLOCK = 8
 
 
 def observations(
-    name: str, q: NDArray[np.float32], used: NDArray[np.bool_], camera: CameraModel
+    map_: CorrespondenceMap, used: NDArray[np.bool_], camera: CameraModel
 ) -> Observations:
-    """Collect the correspondences ``used`` (H, W) of a map (H, W, 2)."""
+    """Collect the correspondences ``used`` (H, W) of a map."""
     y, x = np.nonzero(used)
     pixels = np.stack([x, y], -1, dtype=np.int32)
-    return Observations(name, camera, q[used].T.astype(np.float64), pixels)
+    weight = None if map_.weight is None else map_.weight[used].astype(np.float64)
+    return Observations(map_.name, camera, map_.q[used].T.astype(np.float64), pixels, weight)
 
 
 def cell_size(frame: Observations, camera: CameraModel, cell_px: float | None) -> float:

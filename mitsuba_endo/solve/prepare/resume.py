@@ -56,10 +56,7 @@ def resumed_problem(
             f"the earlier calibration had {len(checkpoint.rho)} surfaces and the plan asks for "
             f"{plan.surfaces}", "share.surface", "resume with the same plan, or start anew",
         )  # fmt: skip
-    frames = [
-        observations(m.name, m.q, used, camera)
-        for m, used in zip(maps, checkpoint.used, strict=True)
-    ]
+    frames = [observations(m, used, camera) for m, used in zip(maps, checkpoint.used, strict=True)]
     parts = zip(checkpoint.cells, checkpoint.lattices, checkpoint.faces, strict=True)
     lattices = [Lattice(cell, ij, faces) for cell, ij, faces in parts]
     priors = [

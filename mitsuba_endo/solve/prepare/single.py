@@ -27,7 +27,7 @@ def separate_surfaces(
 
     Where the projector pose is shared, all starts hold the same one.
     """
-    frames = [observations(m.name, m.q, s.used, camera) for m, s in zip(maps, starts, strict=True)]
+    frames = [observations(m, s.used, camera) for m, s in zip(maps, starts, strict=True)]
     lattices, priors, rho = [], [], []
     for frame, start in zip(frames, starts, strict=True):
         lattice, inverse = _surface(frame, start, camera, options.cell_px)

@@ -298,7 +298,8 @@ def _frame(report: Report, k: int, slips: int | None) -> Frame:
     fit = report.fit
     state = fit.state
     weight = fit.reported.weights[k]
-    r2 = fit.reported.evaluation.squared(k)
+    # Of the pattern as it is seen, not whitened.
+    r2 = fit.reported.evaluation.squared(k) / fit.problem.frames[k].whitening ** 2
     used = weight > USED_WEIGHT
     per_frame_focal = report.plan.blocks["focal"] == "per_frame"
     valid = int(fit.maps[k].valid.sum())
