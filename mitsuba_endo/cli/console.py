@@ -74,19 +74,28 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
             yield Session(quiet, as_json)
     except typer.Exit:
         raise
-    except InputError as error:
-        _fail(str(error), error.exit_code, as_json)
-    except KeyboardInterrupt:
-        # Caught within exec of a text (libraries build classes so), an interrupt leaves a mark with
-        # which CPython ends by the signal, whatever the exit code; the next exec wipes it off.
-        exec("")
-        _fail("interrupted; no output was left half written.", EXIT_INTERRUPTED, as_json)
-    except Exception as error:  # the boundary of the program: nothing above us could handle it
+    except (KeyboardInterrupt, Exception) as error:  # the boundary: nothing above handles it
+        if _is_interrupt(error):
+            # Caught within exec of a text (libraries build classes so), an interrupt leaves a mark
+            # with which CPython ends by the signal, whatever the exit code; the next exec wipes it
+            # off.
+            exec("")
+            _fail("interrupted; no output was left half written.", EXIT_INTERRUPTED, as_json)
+        if isinstance(error, InputError):
+            _fail(str(error), error.exit_code, as_json)
         if debug:
             traceback.print_exc()
         hint = "please report it" if debug else "see it with --debug, and please report it"
         text = f"internal fault ({type(error).__name__}: {error}); {hint}."
         _fail(text, EXIT_INTERNAL, as_json)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Tell Ctrl-C, also where a library that was being loaded took it for a fault of its own."""
+    link: BaseException | None = error
+    while link is not None and not isinstance(link, KeyboardInterrupt):
+        link = link.__cause__ or link.__context__
+    return link is not None
 
 
 def _fail(message: str, code: int, as_json: bool) -> NoReturn:

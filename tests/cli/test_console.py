@@ -13,12 +13,20 @@ from mitsuba_endo.errors import InputError, NothingDecodedError
 from tests.cli.inputs import run
 
 
+def _while_loading(cause: BaseException) -> InputError:
+    """Return what becomes of an exception while an extension module is loaded."""
+    fault, told = ImportError("extension"), InputError("Mitsuba cannot start")
+    fault.__cause__, told.__cause__ = cause, fault
+    return told
+
+
 @pytest.mark.parametrize(
     ("error", "code", "text"),
     [
         (InputError("is odd", "a.yaml: b", "mend it"), 2, "error: a.yaml: b: is odd; mend it.\n"),
         (NothingDecodedError("no pattern", "a.png"), 3, "error: a.png: no pattern.\n"),
         (KeyboardInterrupt(), 130, "error: interrupted"),
+        (_while_loading(KeyboardInterrupt()), 130, "error: interrupted"),
         (ZeroDivisionError("1/0"), 70, "error: internal fault (ZeroDivisionError: 1/0); "),
         (typer.Exit(1), 1, ""),
     ],
