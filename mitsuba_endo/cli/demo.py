@@ -1,6 +1,7 @@
 """``mitsuba-endo demo``: the whole way from a scene to a judged calibration."""
 
 import shutil
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -84,6 +85,7 @@ def _report(
 ) -> None:
     from .summary import comparison_table, metrics_table
 
+    program = "mitsuba-endo" if shutil.which("mitsuba-endo") else sys.argv[0]
     output.print(
         f"An endoscope before a stomach wall, {SETTINGS['width']} x {SETTINGS['height']} pixels. "
         "One image of the coded grid; focal length, pose and surface unknown, the length of the "
@@ -94,10 +96,12 @@ def _report(
         f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
         f"  {out}/capture/image.png        what the endoscope sees",
         f"  {out}/decoded/image_graph.png  the grid found in it",
-        f"  {out}/solution/report.html     verdict, maps, surface with its error, rig",
-        f"  {out}/solution/solution.json   the result, {out}/metrics.json its errors",
-        f"Again by hand: mitsuba-endo calibrate {out}/input/{IMAGE} "
-        f"--rig {out}/input/rig.yaml --out result",
+        f"  {out}/solution/report.html     verdict, maps, surface, its error",
+        f"  {out}/solution/solution.json   the result",
+        f"  {out}/metrics.json             its errors",
+        "Again by hand:",
+        f"  {program} calibrate {out}/input/{IMAGE} \\",
+        f"    --rig {out}/input/rig.yaml --out result",
     )
     output.summary(
         {
