@@ -10,6 +10,7 @@ from ...records.calibration import Snapshot
 from ..colours import CAMERA, PROJECTOR, UNUSED
 from .nodes import small
 
+_WHOLE = tuple(digit * 10.0**power for power in range(4) for digit in (1, 2, 5))
 Data = tuple[NDArray[np.float64], ...]
 NOTE = (
     "Blue: robust cost per correspondence, in units of the robust scale, and so it jumps where "
@@ -39,7 +40,7 @@ def add_cost_chart(server: Any, history: Sequence[Snapshot]) -> Any:
         series=(uplot.Series(label="iteration"), line, scale, mark),
         scales={"x": uplot.Scale(time=False), "y": uplot.Scale(distr=3)},
         axes=(
-            uplot.Axis(label="iteration", labelSize=18, size=34),
+            uplot.Axis(label="iteration", labelSize=18, size=34, incrs=_WHOLE),
             uplot.Axis(label="robust cost", labelSize=18, size=56),
         ),
         legend=uplot.Legend(show=False),

@@ -25,6 +25,7 @@ class LiveView:
         light(server)
         self._state = server.gui.add_markdown("**Searching for a start**")
         self._told = server.gui.add_html(small("Lengths are multiples of the first baseline."))
+        server.gui.add_html(small("Blue: camera; orange: projector."))
         self._chart: Any = None
 
     def show(self, snapshot: Snapshot) -> None:

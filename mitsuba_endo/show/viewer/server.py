@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import logging
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -24,6 +25,8 @@ def running_server(host: str, port: int) -> Iterator[Any]:
         raise InputError(
             "viser is not installed", "viewer", 'run pip install "mitsuba-endo[view]"'
         ) from None
+    # A browser that leaves while it connects is no fault to show a traceback for.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     with _silent():
         try:
             server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
