@@ -37,6 +37,9 @@ LINK_COST = 2.0
 """Price, in evidence, of a link between two placements."""
 WEAKEST = 0.2
 """Share of that price for the worst link."""
+LEAST = 0.1
+"""Evidence a node, under which a part is left out although links lead there: right parts of badly
+corrupted images have about 0.3, chance gives less than 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,8 @@ def _parts(
     found = [whole.best, *candidates(place, known, pattern)]
     labels = list(dict.fromkeys([*found, *(whole.best.shifted(*slip) for slip in SLIPS)]))
     cost = np.stack([-scores_at(label, place, known, pattern) for label in labels], -1)
-    # The last label stands for "none of them", at the evidence of chance.
-    cost = np.concatenate([cost, np.zeros((len(members), 1))], axis=1)
+    # The last label stands for "none of them", at little more than the evidence of chance.
+    cost = np.concatenate([cost, np.full((len(members), 1), -LEAST)], axis=1)
     links = _within(graph.links, members, len(graph.nodes))
     price = LINK_COST * (WEAKEST + (1 - WEAKEST) * links.quality)
     label = cut(cost, links.start, links.end, price)
