@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -84,6 +85,20 @@ def test_ends_with_the_calibration(capture: Path, tmp_path: Path):
     assert errors == ""
     assert "Outcome: converged." in out
     assert load_solution(tmp_path / "out").outcome == "converged"
+    assert not _answers(address)
+
+
+def test_ctrl_c_ends_it(capture: Path, tmp_path: Path):
+    """Oracle: exit code 130, one sentence, nothing left half written."""
+    with _live(capture, tmp_path / "out") as process:
+        address = _address(process)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 130, errors
+    assert errors.count("\n") <= 1, errors
+    left = list(tmp_path.iterdir())
+    assert left == [] or (tmp_path / "out" / "solution.json").exists()
     assert not _answers(address)
 
 
