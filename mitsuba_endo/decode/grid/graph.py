@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from .heads import Heads
 from .links import Links, find_links
 from .nodes import Nodes, find_nodes
+from .quads import quads
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,28 +30,18 @@ class GridGraph:
 def build_graph(heads: Heads) -> GridGraph:
     """Return the graph of an image."""
     nodes = find_nodes(heads)
-    links = find_links(nodes, heads)
-    closed = in_quad(links, len(nodes))
+    return graph_of(nodes, find_links(nodes, heads))
+
+
+def graph_of(nodes: Nodes, links: Links) -> GridGraph:
+    """Return the graph of nodes and links."""
+    closed = quads(links, len(nodes)) > 0
     links, loose = links.chosen(closed), links.chosen(~closed)
     component = components(links, len(nodes))
     place = _places(links, component)
     fits = (place[links.end] - place[links.start] == links.step).all(1)
     # A component that closes only by links that contradict each other loses them.
     return GridGraph(nodes, links.chosen(fits), loose, component, place)
-
-
-def in_quad(links: Links, count: int) -> NDArray[np.bool_]:
-    """Tell which links (L,) belong to a closed quad of four."""
-    to = np.full((2, count + 1), count)
-    number = np.full((2, count + 1), len(links))
-    to[links.axis, links.start] = links.end
-    number[links.axis, links.start] = np.arange(len(links))
-    right, down = to
-    corner = np.flatnonzero((right[down] == down[right]) & (right[down] < count))
-    used = np.zeros(len(links) + 1, bool)
-    for axis, start in ((0, corner), (1, corner), (0, down[corner]), (1, right[corner])):
-        used[number[axis, start]] = True
-    return used[:-1]
 
 
 def components(links: Links, count: int) -> NDArray[np.intp]:

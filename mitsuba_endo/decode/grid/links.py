@@ -1,6 +1,6 @@
 """Links between neighbouring nodes, along each of which the phase turns exactly once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
 from .heads import Heads
-from .nodes import Nodes, wrapped
+from .nodes import Nodes, larger, wrapped
 
 NEAR = 0.35
 """Periods by which a neighbour may miss its predicted place."""
@@ -17,6 +17,9 @@ MAX_TURN_ERROR = 0.2
 MAX_EDGE = 0.8
 MIN_CONFIDENCE = 0.3
 """Mean along a link: lower than a node's, because a highlight may lie on it."""
+POSSIBLE_TURN_ERROR = 0.5
+POSSIBLE_CONFIDENCE = 0.15
+"""The same limits for links that the graph network judges."""
 SAMPLES = 13
 STEPS = np.array([[1, 0], [0, 1]])
 """Place in the grid of the neighbour that a link leads to: the right one, the lower one."""
@@ -48,16 +51,58 @@ class Links:
         return Links(self.start[which], self.end[which], self.axis[which], self.quality[which])
 
 
+@dataclass(frozen=True, eq=False)
+class Measures:
+    """What lies along links."""
+
+    turn_error: NDArray[np.float64]
+    """(L, 2) periods by which the phase's integral misses its due; 9 across a jump."""
+    edge: NDArray[np.float64]
+    """(L,) highest probability of a depth edge."""
+    edge_mean: NDArray[np.float64]
+    """(L,)"""
+    confidence: NDArray[np.float64]
+    """(L,) mean."""
+    confidence_least: NDArray[np.float64]
+    """(L,)"""
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Measures":
+        """Return the measures of the links for which ``which`` (L,) holds."""
+        return Measures(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
 def find_links(nodes: Nodes, heads: Heads) -> Links:
     """Return the links of mutual neighbours along which phase, confidence and edges allow it."""
+    links = _all_proposed(nodes)
+    found = _measured(links, nodes, heads)
+    error = larger(found.turn_error)
+    good = (error < MAX_TURN_ERROR) & (found.edge < MAX_EDGE)
+    good &= found.confidence > MIN_CONFIDENCE
+    quality = np.clip((1 - error / MAX_TURN_ERROR) * (1 - found.edge / MAX_EDGE), 0, 1)
+    links = replace(links, quality=quality).chosen(good)
+    return links.chosen(_best_of_each(links))
+
+
+def candidate_links(nodes: Nodes, heads: Heads) -> tuple[Links, Measures]:
+    """Return links of mutual neighbours that may be real, for the graph network to judge."""
+    links = _all_proposed(nodes)
+    found = _measured(links, nodes, heads)
+    error = larger(found.turn_error)
+    possible = (error < POSSIBLE_TURN_ERROR) & (found.confidence > POSSIBLE_CONFIDENCE)
+    quality = (1 - error / POSSIBLE_TURN_ERROR) * (1 - found.edge / 2)
+    links, found = replace(links, quality=quality).chosen(possible), found.chosen(possible)
+    best = _best_of_each(links)
+    return links.chosen(best), found.chosen(best)
+
+
+def _all_proposed(nodes: Nodes) -> Links:
     if len(nodes) < 2:
         none = np.empty(0, np.intp)
         return Links(none, none, none, np.empty(0))
     parts = [_proposed(nodes, step) for step in STEPS]
     start, end = (np.concatenate([p[k] for p in parts]) for k in (0, 1))
     axis = np.repeat([0, 1], [len(p[0]) for p in parts])
-    links = Links(start, end, axis, np.ones(len(start)))
-    return _best_of_each(_checked(links, nodes, heads))
+    return Links(start, end, axis, np.ones(len(start)))
 
 
 def _proposed(nodes: Nodes, step: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -74,8 +119,8 @@ def _proposed(nodes: Nodes, step: NDArray[np.intp]) -> tuple[NDArray[np.intp], N
     return start, end
 
 
-def _best_of_each(links: Links) -> Links:
-    """Keep the links that are the best of both their ends in their direction."""
+def _best_of_each(links: Links) -> NDArray[np.bool_]:
+    """Tell which links (L,) are the best of both their ends in their direction."""
     order = np.lexsort((-links.quality, links.axis))
     best = np.ones(len(links), bool)
     for end in (links.start, links.end):
@@ -83,7 +128,7 @@ def _best_of_each(links: Links) -> Links:
         first = np.zeros(len(links), bool)
         first[np.unique(pairs, axis=0, return_index=True)[1]] = True
         best[order] &= first
-    return links.chosen(best)
+    return best
 
 
 def _neighbour(nodes: Nodes, step: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -95,18 +140,14 @@ def _neighbour(nodes: Nodes, step: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.where(near, found, -1)
 
 
-def _checked(links: Links, nodes: Nodes, heads: Heads) -> Links:
+def _measured(links: Links, nodes: Nodes, heads: Heads) -> Measures:
     """Integrate the phase along the links, and look for depth edges on them."""
     share = np.linspace(0, 1, SAMPLES)[:, None, None]
     path = (1 - share) * nodes.at[links.start] + share * nodes.at[links.end]
     at = path[..., ::-1].transpose(2, 0, 1)
-    turned = _integral(heads.phase, at)
-    error = np.abs(turned - links.step).max(1)
-    edge = _sample(heads.edge, at).max(0)
-    sure = _sample(heads.confidence, at).mean(0)
-    good = (error < MAX_TURN_ERROR) & (edge < MAX_EDGE) & (sure > MIN_CONFIDENCE)
-    quality = np.clip((1 - error / MAX_TURN_ERROR) * (1 - edge / MAX_EDGE), 0, 1)
-    return Links(links.start, links.end, links.axis, quality).chosen(good)
+    error = np.abs(_integral(heads.phase, at) - links.step)
+    edge, sure = _sample(heads.edge, at), _sample(heads.confidence, at)
+    return Measures(error, edge.max(0), edge.mean(0), sure.mean(0), sure.min(0))
 
 
 def _integral(phase: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -54,7 +54,10 @@ class Network:
         Raises:
             InputError: not an image.
         """
-        x = normalise(image)
+        return self.heads_of_input(normalise(image))
+
+    def heads_of_input(self, x: NDArray[np.float32]) -> Heads:
+        """Return the same for an image that is normalised already, (2, H, W)."""
         height, width = x.shape[1:]
         below, beside = (max(-n % STRIDE, LEAST - n) for n in (height, width))
         padded = np.pad(x, ((0, 0), (0, below), (0, beside)), mode="edge")
