@@ -67,7 +67,8 @@ def _memory(notes: list[dict[str, float]], quick: bool) -> list[Figure]:
         own = sorted((n for n in notes if n["worker"] == worker), key=lambda n: n["order"])
         sizes = [note["memory"] for note in own]
         warm = min(WARM, len(sizes) // 2)
-        growth = 100 * (np.mean(sizes[-warm // 2 :]) / np.mean(sizes[warm // 2 : warm]) - 1)
+        span = warm // 2
+        growth = 100 * (np.mean(sizes[-span:]) / np.mean(sizes[warm : warm + span]) - 1)
         figures += [
             _figure(f"worker {number}, memory after {len(sizes)} samples by that after {warm}",
                     float(growth), "% more", "lower", None if quick else 10),
