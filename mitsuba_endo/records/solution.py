@@ -167,7 +167,8 @@ class Solution(Record):
     surface: str | None = None
     """File name of the surface beside this file, in the first camera's frame."""
     noise_px: float | None = None
-    """Robust estimate of the noise of one projector coordinate, pattern pixels."""
+    """Robust estimate of the noise of one projector coordinate, pattern pixels; where maps have
+    weights, of a coordinate of their mean weight."""
     law_evidence: dict[str, Any] = {}
     observability: dict[str, Any] = {}
     timings: dict[str, float] = {}

@@ -18,6 +18,7 @@ from .optimise.run import Progress
 from .options import Options
 from .pipeline import Found, Job, finish, search
 from .prepare.resume import checkpoint_of
+from .prepare.weights import balanced
 from .results.assemble import assemble
 from .results.law_evidence import cheaper, choose_law
 
@@ -59,7 +60,8 @@ def calibrate(
     )
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
-        jobs = [Job(maps, camera, rig, law, options, resume, history=History(observe))
+        given = balanced(maps)
+        jobs = [Job(given, camera, rig, law, options, resume, history=History(observe))
                 for law in laws]  # fmt: skip
         fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")

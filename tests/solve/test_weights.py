@@ -8,6 +8,8 @@ import pytest
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
+from mitsuba_endo.solve.prepare.weights import balanced
+from tests.rigs import with_noise
 from tests.solve.problems import map_of, rig_file, small_rig
 
 LOW, HIGH = 0.1, 1.6
@@ -28,7 +30,8 @@ def noisy(seed: int) -> CorrespondenceMap:
 
 @pytest.mark.usefixtures("llvm")
 def test_weights_sharpen_the_calibration_and_its_intervals():
-    """Oracle: the true focal length, within the stated deviation; the noise of the best pixels."""
+    """Oracle: the true focal length, within the stated deviation; the noise that the mean weight
+    stands for."""
     rig = small_rig("pinhole")
     errors, stds, plain = [], [], []
     for seed in range(6):
@@ -39,9 +42,39 @@ def test_weights_sharpen_the_calibration_and_its_intervals():
         assert isinstance(focal.std, float)
         errors.append(focal.value - rig.projector.focal)
         stds.append(focal.std)
-        assert found.solution.noise_px == pytest.approx(LOW, rel=0.25)
+        assert map_.weight is not None
+        typical = LOW / np.sqrt(map_.weight[map_.valid].mean())
+        assert found.solution.noise_px == pytest.approx(typical, rel=0.25)
         without = calibrate([replace(map_, weight=None)], rig_file(rig), FORMAL).solution
         assert isinstance(without.projector.focal.value, float)
         plain.append(without.projector.focal.value - rig.projector.focal)
     assert np.sqrt(np.mean(np.square(errors))) < 0.7 * np.sqrt(np.mean(np.square(plain)))
     assert 0.4 < np.sqrt(np.mean((np.array(errors) / stds) ** 2)) < 1.8
+
+
+@pytest.mark.usefixtures("llvm")
+def test_only_ratios_of_weights_count():
+    """Oracle: the map without weights: a factor common to all of them says nothing."""
+    rig = with_noise(small_rig("pinhole"), 0.3, 3)
+    map_ = map_of(rig)
+    alike = replace(map_, weight=np.full(map_.q.shape[:2], 0.04, np.float32))
+    plain, weighted = (calibrate([m], rig_file(rig), FORMAL).solution for m in (map_, alike))
+    for a, b in (
+        (weighted.projector.focal.value, plain.projector.focal.value),
+        (weighted.projector.focal.std, plain.projector.focal.std),
+        (weighted.noise_px, plain.noise_px),
+    ):
+        assert a == pytest.approx(b, rel=1e-5)
+
+
+def test_frames_keep_their_ratio():
+    """Oracle: by hand: weights 0.5 and, where a map has none, 1; holes do not count."""
+    q = np.ones((2, 3, 2), np.float32)
+    q[0, 0] = np.nan
+    weight = np.full((2, 3), 0.5, np.float32)
+    weight[0, 0] = np.nan
+    first, second = balanced([CorrespondenceMap(q, "a", weight), CorrespondenceMap(q, "b")])
+    assert first.weight is not None
+    assert second.weight is not None
+    np.testing.assert_allclose(first.weight[first.valid], 2 / 3, rtol=1e-6)
+    np.testing.assert_allclose(second.weight[second.valid], 4 / 3, rtol=1e-6)

@@ -181,7 +181,7 @@ def evaluate(problem: Problem, state: State) -> Evaluation:
 
 
 def estimate_noise(at: Evaluation) -> float:
-    """Return the robust standard deviation of a best observation's component, pattern pixels."""
+    """Return the robust standard deviation of one whitened component, pattern pixels."""
     r2 = np.concatenate([at.squared(k) for k in range(len(at.residuals))])
     r2 = r2[np.isfinite(r2)]
     if not len(r2):

@@ -28,11 +28,11 @@ class Observations:
     pixels: NDArray[np.int32]
     """(N, 2) image position (x, y) of every observation."""
     weight: NDArray[np.float64] | None = None
-    """(N,) 1 / variance relative to the best observation; None = all alike."""
+    """(N,) 1 / variance relative to a typical observation; None = all alike."""
 
     @property
     def whitening(self) -> NDArray[np.float64] | float:
-        """(N,) factor that gives every residual the noise of the best observation."""
+        """(N,) factor that gives every residual the noise of a typical observation."""
         return 1.0 if self.weight is None else np.sqrt(self.weight)
 
     @property
