@@ -1,7 +1,8 @@
 """Camera models: pixel to ray and back.
 
 Pixels follow OpenCV: integer = pixel centre. Formulas run on NumPy and Dr.Jit components alike.
-Adding a model is one class with ``@register_camera`` and nothing else.
+Adding a model is one class with ``@register_camera``, and the names of its coefficients in
+:data:`mitsuba_endo.rendering.keys.LENSES`, by which scenes give them.
 """
 
 from collections.abc import Sequence

@@ -167,7 +167,7 @@ def _check_weight(weight: NDArray[np.float32], q: NDArray[np.float32], source: s
             f"weight has shape {weight.shape} and the map {q.shape[:2]}", source,
             "give one weight for each pixel",
         )  # fmt: skip
-    known = weight[np.isfinite(weight)]
+    known = weight[~np.isnan(weight)]
     if known.size and not (known.min() >= 0 and known.max() <= 1):
         raise InputError(
             f"weights reach from {known.min():g} to {known.max():g}", source,

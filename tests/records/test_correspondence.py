@@ -107,6 +107,12 @@ def _text(path: Path) -> Path:
     return path
 
 
+def _endless() -> np.ndarray:
+    weight = np.full((5, 9), 0.5)
+    weight[2, 3] = np.inf
+    return weight
+
+
 def _one_channel(path: Path) -> Path:
     write_exr(path, {"projector.x": _q()[..., 0]})
     return path
@@ -129,6 +135,7 @@ def _one_channel(path: Path) -> Path:
         (_one_channel, "m.exr", "channel projector.y is missing"),
         (lambda p: _npz(p, map=_q(), weight=_q()), "m.npz", "weight has shape (5, 9, 2)"),
         (lambda p: _npz(p, map=_q(), weight=4 * np.ones((5, 9))), "m.npz", "from 4 to 4; divide"),
+        (lambda p: _npz(p, map=_q(), weight=_endless()), "m.npz", "from 0.5 to inf; divide"),
         (lambda p: _npz(p, map=_q() * np.nan), "m.npz", "the map has no finite value"),
         (lambda p: _npz(p, map=_q() / 1000 % 1), "m.npz", "lie between 0 and 1; give them in"),
     ],
