@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
 from mitsuba_endo.evaluate.depth import RayCaster
@@ -65,7 +66,7 @@ def bar_groups(found: Mapping[tuple[str, str], Sequence[float]], label: str) -> 
         axes.set_xticks(range(len(cases)), [case.replace(", ", "\n") for case in cases])
         axes.set_title(group.replace("_", " "))
         axes.set_ylabel(label)
-        axes.set_yscale("log")
+        _logarithmic(axes)
         axes.spines[["top", "right"]].set_visible(False)
     return figure
 
@@ -100,7 +101,7 @@ def peer_bars(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> Figu
             values = [r[column] for r in rows if r["method"] == method]
             at = np.arange(len(laws)) + (m - (len(methods) - 1) / 2) * 0.16
             axes.bar(at, values, 0.15, color=COLOURS[m], label=method)
-        axes.set_yscale("log")
+        _logarithmic(axes)
         axes.set_xticks(range(len(laws)), laws)
         axes.set_title(column)
         axes.spines[["top", "right"]].set_visible(False)
@@ -126,13 +127,26 @@ def curves(
         for m, (name, points) in enumerate(found.items()):
             x, y = np.array([(p[0], p[1 + i]) for p in points]).T
             axes.plot(x, y, "o-", color=COLOURS[m], label=name, markersize=4)
-        axes.set_yscale("log")
+        axes.set_xticks(sorted({p[0] for points in found.values() for p in points}))
+        _logarithmic(axes)
         axes.set_xlabel(label)
         axes.set_title(title, fontsize=10)
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(axis="y", alpha=0.3)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center")
     return figure
+
+
+def _logarithmic(axes: Any) -> None:
+    """Make the vertical axis logarithmic, with plain numbers: the more, the less it spans."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    steps = [1.0]
+    if high < 200 * low:
+        steps = [1.0, 2.0, 5.0] if high > 10 * low else [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0]
+    axes.yaxis.set_major_locator(LogLocator(subs=steps, numticks=20))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def sizes_picture(sized: Sequence[tuple[float, PolypSize]], threshold: float) -> Figure:

@@ -57,7 +57,7 @@ def write_results(page: Path, done: dict[str, tuple[str, Path]]) -> None:
     head = "## Targets\n\n" + markdown(targets) + "\n" if targets else ""
     worse = _better_peers(done)
     if worse:
-        head += f"## Where a peer does better\n\n{markdown(worse)}\n"
+        head += f"## Where a peer does better\n\nBy more than 5 %.\n\n{markdown(worse)}\n"
     with atomic_path(page) as aside:
         aside.write_text(INTRO + head + "\n".join(parts), encoding="utf-8")
 
