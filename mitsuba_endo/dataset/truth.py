@@ -67,7 +67,8 @@ def truth_maps(
     """
     shape = camera.height, camera.width
     ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
-    hits = hits or scene.through_pixels(camera, world_from_camera)
+    if hits is None:
+        hits = scene.through_pixels(camera, world_from_camera)
     points = world_from_camera.inverse().apply(hits.points)
     q = np.where(hits.hit[:, None], projector.project(projector_from_camera.apply(points)), np.nan)
     light = (world_from_camera @ projector_from_camera.inverse()).t

@@ -4,6 +4,7 @@ import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -78,7 +79,8 @@ def save_map(
     if Path(path).suffix.lower() == ".npz":
         # An open file, because NumPy appends its own suffix to names that end in .NPZ.
         with atomic_path(path) as aside, aside.open("wb") as file:
-            np.savez_compressed(file, allow_pickle=False, map=q, **(further or {}))
+            arrays: dict[str, Any] = {"map": q, **(further or {})}
+            np.savez_compressed(file, **arrays)
         return
     write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)} | (further or {}))
 

@@ -100,7 +100,7 @@ def _from_others(job: Job, law: int, found: list[Found], say: Progress) -> Found
         alike = replace(job, resume=start, foreseen=[], history=History())
         again = search(alike, say).optimum
         if again.outcome is Outcome.INTERRUPTED:
-            return replace(own, optimum=again)
+            return replace(best, optimum=replace(best.optimum, outcome=Outcome.INTERRUPTED))
         if cheaper(again, best.optimum):
             best = replace(own, optimum=again)
     return best

@@ -9,8 +9,10 @@ from mitsuba_endo.geometry.laws import LAWS
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Outcome
+from mitsuba_endo.solve import pipeline
 from mitsuba_endo.solve.calibrate import calibrate, solve_each
 from mitsuba_endo.solve.fit import Fit
+from mitsuba_endo.solve.optimise.run import Progress
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.pipeline import Job
 from mitsuba_endo.solve.results.law_evidence import choose_law
@@ -63,10 +65,9 @@ def test_data_that_cannot_tell() -> None:
     assert any("give projector.law if it is known" in w for w in solution.warnings)
 
 
-def fits(views: Views, **options: int) -> list[Fit]:
+def fits(views: Views) -> list[Fit]:
     jobs = [
-        Job(views.maps, views.camera, views.rig(), law, Options(jackknife=False, **options))
-        for law in LAWS
+        Job(views.maps, views.camera, views.rig(), law, Options(jackknife=False)) for law in LAWS
     ]
     return solve_each(jobs, lambda _share, _step: None)
 
@@ -75,6 +76,23 @@ def ended(fit: Fit, outcome: Outcome, step: float) -> Fit:
     """The fit as if it had ended otherwise, its last step ``step`` standard deviations long."""
     trace = [*fit.optimum.trace[:-1], replace(fit.optimum.trace[-1], step=step)]
     return replace(fit, optimum=replace(fit.optimum, outcome=outcome, trace=trace))
+
+
+def test_interrupt_in_the_second_try_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Oracle: the law's own optimum, said to be interrupted; no other law is finished."""
+    found: list[pipeline.Found] = []
+
+    def search(job: Job, say: Progress) -> pipeline.Found:
+        if len(found) == 2:
+            wrong = replace(found[0].optimum, outcome=Outcome.INTERRUPTED, cost=np.inf)
+            return replace(found[0], optimum=wrong)
+        found.append(pipeline.search(job, say))
+        return found[-1]
+
+    monkeypatch.setattr("mitsuba_endo.solve.calibrate.search", search)
+    (fit,) = fits(narrow_and_noisy())
+    assert fit.optimum.outcome is Outcome.INTERRUPTED
+    assert fit.optimum.cost == found[0].optimum.cost
 
 
 @pytest.mark.parametrize("which", [0, 1])
