@@ -78,16 +78,18 @@ def solve_each(jobs: list[Job], say: Progress) -> list[Fit]:
     Returns:
         One fit a law; the interrupted one alone where the user stopped.
     """
+    parts = 2 * len(jobs) if len(jobs) > 1 else 1  # one law has no others to start from
+    done = _part(say, parts, parts)
     found: list[Found] = []
     for i, job in enumerate(jobs):
-        found.append(search(job, _part(say, i, 2 * len(jobs) if len(jobs) > 1 else 1)))
+        found.append(search(job, _part(say, i, parts)))
         if found[-1].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[-1], _part(say, 1, 1))]
-    for i, job in enumerate(jobs if len(jobs) > 1 else []):
-        found[i] = _from_others(job, i, found, _part(say, len(jobs) + i, 2 * len(jobs)))
+            return [finish(job, found[-1], done)]
+    for i, job in enumerate(jobs):
+        found[i] = _from_others(job, i, found, _part(say, len(jobs) + i, parts))
         if found[i].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[i], _part(say, 1, 1))]
-    return [finish(job, f, _part(say, 1, 1)) for job, f in zip(jobs, found, strict=True)]
+            return [finish(job, found[i], done)]
+    return [finish(job, f, done) for job, f in zip(jobs, found, strict=True)]
 
 
 def _from_others(job: Job, law: int, found: list[Found], say: Progress) -> Found:

@@ -62,8 +62,6 @@ class Linearisation:
 
     def scaled(self, factor: NDArray[np.float64] | float) -> "Linearisation":
         """Return the model whose derivatives are multiplied by a factor (N,) of each pixel."""
-        if isinstance(factor, float) and factor == 1:
-            return self
         return replace(self, J_surface=factor * self.J_surface, J_local=factor * self.J_local)
 
     @cached_property

@@ -48,13 +48,11 @@ class Evaluation:
             return self._only[0]
         plan = self.problem.plan
         self.problem.move_surfaces(self.state)
-        lin = (
-            self.problem.renderers[frame]
-            .linearise(
-                self.state, frame, plan.surface_of(frame), plan.active(frame), plan.distortion_terms
-            )
-            .scaled(self.problem.frames[frame].whitening)
+        lin = self.problem.renderers[frame].linearise(
+            self.state, frame, plan.surface_of(frame), plan.active(frame), plan.distortion_terms
         )
+        if self.problem.frames[frame].weight is not None:
+            lin = lin.scaled(self.problem.frames[frame].whitening)
         if plan.frames == 1:
             self._only.append(lin)
         return lin
