@@ -152,9 +152,8 @@ class Studio:
         camera = self._setup.camera
         hits = self.surface.through_pixels(camera, world_from_camera)
         seen = hits.hit
+        check_view(float(seen.mean()), hits.from_behind(world_from_camera.t))
         ways = hits.points - world_from_camera.t
-        away = np.einsum("ni,ni->n", hits.normals[seen], ways[seen]) > 0
-        check_view(float(seen.mean()), float(away.mean()) if seen.any() else 0.0)
         distance = np.where(seen, np.sqrt(np.einsum("ni,ni->n", ways, ways)), np.nan)
         shape = camera.height, camera.width
         return _View(

@@ -90,7 +90,8 @@ class _Judge:
                 return f"the {name} nearer than {self.rules.margin:g} mm to the surface", 0.0
         if self._wall_between(world_from_camera.t, world_from_projector.t):
             return "the surface between camera and projector", 0.0
-        if self._from_behind(world_from_camera) > FROM_BEHIND:
+        seen = self.scene.through_pixels(self.camera, world_from_camera)
+        if seen.from_behind(world_from_camera.t) > FROM_BEHIND:
             return "the camera behind or inside the surface", 0.0
         view = self.scene.view(self.camera, world_from_camera, self.projector,
                                projector_from_camera, self.pattern_size)  # fmt: skip
@@ -104,12 +105,6 @@ class _Judge:
         length = float(np.linalg.norm(way))
         met = self.scene.cast(a, way[None] / length)
         return bool(met.hit[0]) and float(np.linalg.norm(met.points[0] - a)) < length
-
-    def _from_behind(self, world_from_camera: RigidTransform) -> float:
-        """Return the share of the surface's image in which its faces point away."""
-        met = self.scene.through_pixels(self.camera, world_from_camera)
-        away = np.einsum("ni,ni->n", met.normals, met.points - world_from_camera.t) > 0
-        return float(away[met.hit].mean()) if met.hit.any() else 0.0
 
 
 def clearance(mesh: Mesh, point: Array, within: float) -> float:

@@ -38,6 +38,12 @@ class Hits:
     hit: NDArray[np.bool_]
     """(N,)."""
 
+    def from_behind(self, origin: NDArray[np.float64]) -> float:
+        """Return the share of the hits that rays from ``origin`` (3,) have on faces' backs."""
+        ways, normals = self.points[self.hit] - origin, self.normals[self.hit]
+        away = np.einsum("ni,ni->n", normals, ways) > 0
+        return float(away.mean()) if len(away) else 0.0
+
 
 class MeshScene:
     """A mesh in the world, of which views give correspondences."""
