@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from ..decode.grid.graph import GridGraph, build_graph, graph_of
 from ..decode.grid.heads import Heads, smoothed
 from ..decode.grid.identify import identify
-from ..decode.grid.links import MAX_EDGE, MAX_TURN_ERROR, MIN_CONFIDENCE, candidate_links
-from ..decode.grid.nodes import find_nodes, larger
-from ..decode.grid.quads import quads
+from ..decode.grid.links import MAX_EDGE, MAX_TURN_ERROR, MIN_CONFIDENCE
+from ..decode.grid.nodes import larger
 from ..decode.grid.unwrap import unwrap
 from ..files import atomic_path
 from .compose import Truth
-from .graph_features import link_features, node_features
+from .graph_features import candidates
 from .graph_model import GraphNet
 
 WRONG = 0.5
@@ -73,16 +72,15 @@ def judged_graph(heads: Heads, net: GraphNet) -> GridGraph:
     Links that it believes in, and that the rules allow, are kept; their quality, which is the price
     of cutting them, is the log of their odds.
     """
-    nodes = find_nodes(heads)
-    links, found = candidate_links(nodes, heads)
-    about_nodes = torch.from_numpy(node_features(nodes, links, heads))
-    about_links = link_features(nodes, links, found, quads(links, len(nodes)))
+    found = candidates(heads)
+    links, measures = found.links, found.measures
+    told = (found.about_nodes, found.about_links, links.start, links.end)
     with torch.no_grad():
-        start, end = torch.from_numpy(links.start), torch.from_numpy(links.end)
-        odds = net(about_nodes, torch.from_numpy(about_links), start, end)[1].double().numpy()
-    allowed = (larger(found.turn_error) < MAX_TURN_ERROR) & (found.edge < MAX_EDGE)
-    allowed &= (found.confidence > MIN_CONFIDENCE) & (odds > LEAST_ODDS)
-    return graph_of(nodes, replace(links, quality=np.clip(odds / SURE_ODDS, 0, 1)).chosen(allowed))
+        odds = net(*(torch.from_numpy(array) for array in told))[1].double().numpy()
+    allowed = (larger(measures.turn_error) < MAX_TURN_ERROR) & (measures.edge < MAX_EDGE)
+    allowed &= (measures.confidence > MIN_CONFIDENCE) & (odds > LEAST_ODDS)
+    judged = replace(links, quality=np.clip(odds / SURE_ODDS, 0, 1))
+    return graph_of(found.nodes, judged.chosen(allowed))
 
 
 def _counts(case: Case, net: GraphNet | None) -> NDArray[np.float64]:

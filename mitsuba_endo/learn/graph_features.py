@@ -1,12 +1,15 @@
 """What the graph network is told of nodes and links: numbers of about one."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..decode.grid.heads import Heads
-from ..decode.grid.links import Links, Measures
-from ..decode.grid.nodes import Nodes, larger
+from ..decode.grid.links import Links, Measures, candidate_links
+from ..decode.grid.nodes import Nodes, find_nodes, larger
+from ..decode.grid.quads import quads
 
 NODE_FEATURES = (
     "confidence", "confidence_around", "edge", "code", "log_period_x", "log_period_y", "skew",
@@ -18,6 +21,30 @@ LINK_FEATURES = (
 )  # fmt: skip
 TYPICAL_PERIOD = 10.0
 """Pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Whatever may be a node or a link of an image, with the features of each."""
+
+    nodes: Nodes
+    links: Links
+    measures: Measures
+    about_nodes: NDArray[np.float32]
+    """(N, F) features."""
+    about_links: NDArray[np.float32]
+    """(L, G) features."""
+
+
+def candidates(heads: Heads) -> Candidates:
+    """Return what the pixel network's smoothed outputs offer."""
+    nodes = find_nodes(heads)
+    links, measures = candidate_links(nodes, heads)
+    closed = quads(links, len(nodes))
+    return Candidates(
+        nodes, links, measures, node_features(nodes, links, heads),
+        link_features(nodes, links, measures, closed),
+    )  # fmt: skip
 
 
 def node_features(nodes: Nodes, links: Links, heads: Heads) -> NDArray[np.float32]:
@@ -35,7 +62,7 @@ def node_features(nodes: Nodes, links: Links, heads: Heads) -> NDArray[np.float3
 
 
 def link_features(
-    nodes: Nodes, links: Links, measures: Measures, quads: NDArray[np.intp]
+    nodes: Nodes, links: Links, measures: Measures, closed: NDArray[np.intp]
 ) -> NDArray[np.float32]:
     """Return (L, G) features in the order of LINK_FEATURES.
 
@@ -43,7 +70,7 @@ def link_features(
         nodes: of the image.
         links: between them.
         measures: of the links.
-        quads: (L,) closed quads that each link belongs to.
+        closed: (L,) quads that each link belongs to.
     """
     away = nodes.at[links.end] - nodes.at[links.start]
     ends = [nodes.slope[end] for end in (links.start, links.end)]
@@ -53,6 +80,6 @@ def link_features(
     columns = [
         links.axis, larger(error), *error.T, measures.edge, measures.edge_mean,
         measures.confidence, measures.confidence_least, np.minimum(np.minimum(*miss), 1),
-        np.minimum(np.maximum(*miss), 1), np.minimum(change, 1), quads / 2,
+        np.minimum(np.maximum(*miss), 1), np.minimum(change, 1), closed / 2,
     ]  # fmt: skip
     return np.stack(columns, -1).astype(np.float32)

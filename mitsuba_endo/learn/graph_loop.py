@@ -13,19 +13,16 @@ from torch.nn.functional import (  # pyright: ignore[reportMissingImports]
 from ..decode.grid.network import Network
 from .cache import ViewCache
 from .compose import compose, random_effects, random_look
+from .examples import PATTERNS
 from .graph_model import GraphNet
 from .graphs import LabelledGraph, labelled_graph
 from .patterns import grid_texture
 from .validation import FOLDED, clean_image, heavy_image
 
-PATTERNS = 160
-"""Those that the pixel network is trained on."""
 SHARE_FOLDED = 0.5
 """Of the graphs, beyond the share that folded views have anyway."""
 SHARE_RANDOM, SHARE_HEAVY = 0.4, 0.45
 """Of the graphs with random and with heavy corruption; the others are clean."""
-
-
 SCALED_BY = 50
 """Graphs that give the features' scale."""
 

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..decode.grid.heads import Heads, smoothed
-from ..decode.grid.links import Links, candidate_links
-from ..decode.grid.nodes import find_nodes, larger
-from ..decode.grid.quads import quads
+from ..decode.grid.links import Links
+from ..decode.grid.nodes import larger
 from .compose import Truth
-from .graph_features import link_features, node_features
+from .graph_features import candidates
 
 RIGHT = 0.25
 """Periods by which a node may miss its true place."""
@@ -34,8 +33,8 @@ class LabelledGraph:
 def labelled_graph(heads: Heads, truth: Truth) -> LabelledGraph:
     """Return the graph that the network's outputs for an image give, and its truth."""
     heads = smoothed(heads)
-    nodes = find_nodes(heads)
-    links, measures = candidate_links(nodes, heads)
+    found = candidates(heads)
+    nodes, links = found.nodes, found.links
     row, column = nodes.pixel
     at = truth.lattice[:, row, column].T
     node = np.rint(at)
@@ -43,8 +42,8 @@ def labelled_graph(heads: Heads, truth: Truth) -> LabelledGraph:
     away = node[links.end] - node[links.start]
     joined = real[links.start] & real[links.end] & (away == links.step).all(1)
     return LabelledGraph(
-        node=node_features(nodes, links, heads),
-        link=link_features(nodes, links, measures, quads(links, len(nodes))),
+        node=found.about_nodes,
+        link=found.about_links,
         links=links,
         node_real=real,
         link_real=joined,
