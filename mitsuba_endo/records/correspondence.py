@@ -15,7 +15,7 @@ from ..files import atomic_path
 
 CHANNELS = ("projector.x", "projector.y")
 WEIGHT = "weight"
-"""Optional third channel of an EXR file, or array of an npz file."""
+"""Optional further channel of an EXR file, or array of an npz file."""
 SUFFIXES = (".exr", ".npz")
 
 
@@ -28,8 +28,8 @@ class CorrespondenceMap:
     name: str
     """How the frame is called in results, usually its file name."""
     weight: NDArray[np.float32] | None = None
-    """(H, W) how well each coordinate is known: 1 / variance relative to the best, in (0, 1]. None:
-    all alike."""
+    """(H, W) how well each coordinate is known: 1 / variance up to a factor that all frames share;
+    in files relative to the best, in (0, 1]. None: all alike."""
 
     @property
     def valid(self) -> NDArray[np.bool_]:
