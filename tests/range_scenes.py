@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
+from mitsuba_endo.shapes import Mesh, make_shape
 from mitsuba_endo.start.registration import RangeImage, Registration
 
 Floats = NDArray[np.float64]
@@ -111,25 +112,28 @@ def random_relief(rng: np.random.Generator, amplitude: float = 1.8) -> Surface:
 
 def organ(name: str, **params: object) -> Surface:
     """A shape of mitsuba_endo.shapes, met by Mitsuba."""
+    return of_mesh(make_shape(name, **params))
+
+
+def rabbit_before_wall(distance: float, wall: float) -> Surface:
+    """The rabbit before a plane that fills the rest of the view, mm along z."""
+    thing, behind = make_shape("rabbit", distance=distance), make_shape("plane", distance=wall)
+    faces = np.concatenate([thing.faces, behind.faces + len(thing.vertices)])
+    return of_mesh(Mesh(np.concatenate([thing.vertices, behind.vertices]), faces))
+
+
+def of_mesh(mesh: Mesh) -> Surface:
     from mitsuba_endo import backend
-    from mitsuba_endo.shapes import make_shape
 
     backend.use("llvm_ad_rgb")
-    import mitsuba as mi
+    from mitsuba_endo.rendering.synthetic import MeshScene
 
-    mesh = make_shape(name, **params)
-    shape = mi.Mesh("organ", len(mesh.vertices), len(mesh.faces))
-    keys = mi.traverse(shape)
-    keys["vertex_positions"] = mesh.vertices.astype(np.float32).ravel()
-    keys["faces"] = mesh.faces.astype(np.uint32).ravel()
-    keys.update()
-    scene = mi.load_dict({"type": "scene", "organ": shape})
+    scene = MeshScene(mesh.vertices, mesh.faces)
 
     def hit(origin: Floats, directions: Floats) -> Floats:
-        d = directions.reshape(-1, 3).T.astype(np.float32)
-        ray = mi.Ray3f(mi.Point3f(*[float(v) for v in origin]), mi.Vector3f(*d))
-        t = np.array(scene.ray_intersect_preliminary(ray).t, np.float64)
-        return np.where(np.isfinite(t), t, np.nan).reshape(directions.shape[:2])
+        met = scene.cast(origin, directions.reshape(-1, 3))
+        t = np.linalg.norm(met.points - origin, axis=1)
+        return np.where(met.hit, t, np.nan).reshape(directions.shape[:2])
 
     return hit
 

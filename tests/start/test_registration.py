@@ -9,6 +9,7 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.start.frame_graph import LOOP, FrameGraph
+from mitsuba_endo.start.pairs import register_pair
 from mitsuba_endo.start.placement import FLAT
 from mitsuba_endo.start.range_image import Frame, make_level, typical_range
 from mitsuba_endo.start.registration import EMPTY, RangeImage, Registration, register_frames
@@ -19,6 +20,7 @@ from tests.range_scenes import (
     cast,
     height_field,
     pose_errors,
+    rabbit_before_wall,
     random_relief,
     random_scene,
     silently_wrong,
@@ -87,6 +89,22 @@ def test_world_is_first_camera_in_its_unit(sheet: Scene) -> None:
         np.testing.assert_allclose(b.scale, 1.05 * a.scale, rtol=0.01)
         at = 1.05 * a.world_from_camera.t
         np.testing.assert_allclose(b.world_from_camera.t, at, atol=0.02 * 12)
+
+
+def test_thing_before_a_wall(llvm: str) -> None:
+    """Oracle: the known motion. A wall slides over its own corner at next to no cost."""
+    camera, rng = wide_camera(), np.random.default_rng(2)
+    rays, surface = camera.rays(camera.pixel_grid()), rabbit_before_wall(48.0, 60.0)
+    moved = RigidTransform.of([-0.024, 0.015, 0.06], [-10.0, 8.0, 1.0])
+    images = [
+        RangeImage(rays, with_noise(cast(surface, p, rays), 0.1, rng), camera)
+        for p in (RigidTransform.identity(), moved)
+    ]
+    unit = typical_range(images[0])
+    target, source = (Frame(image, unit) for image in images)
+    pair = register_pair(target, source, np.random.default_rng(0))
+    assert not pair.fault
+    np.testing.assert_allclose(unit * pair.target_from_source.t[0], moved.t, atol=0.5)
 
 
 def test_same_seed_same_result(sheet: Scene) -> None:
