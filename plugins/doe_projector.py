@@ -7,7 +7,7 @@ from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction
 from mitsuba_endo.rendering.keys import DISTORTION
 from mitsuba_endo.rendering.untyped import dr, mi
 
-from .variants import make_opaque, pointer_to, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 
 _MIN_COSINE = 0.01  # directions beyond 89.4 degrees would overflow the distortion's polynomials
 _ROUND_TRIP_PX = 1e-2
@@ -38,7 +38,7 @@ class DoeProjector:
 
      * - focal
        - |float|
-       - Focal length f in pattern pixels.
+       - Focal length f in pattern pixels, above 0.
        - |exposed|, |differentiable|
 
      * - centre_x, centre_y
@@ -49,7 +49,7 @@ class DoeProjector:
 
      * - aspect
        - |float|
-       - Ratio fy / fx. (Default: 1)
+       - Ratio fy / fx, above 0. (Default: 1)
        - |exposed|, |differentiable|
 
      * - k1, k2, p1, p2, k3
@@ -105,13 +105,13 @@ class DoeProjector:
             raise RuntimeError(f'unknown "law" {self.law!r}, expected one of {", ".join(LAWS)}')
         self.pattern = props.get_texture("pattern", 1.0)
         self.width, self.height = self._read_size(props)
-        self.focal = mi.Float(props["focal"])
-        self.centre_x = mi.Float(props.get("centre_x", (self.width - 1) / 2))
-        self.centre_y = mi.Float(props.get("centre_y", (self.height - 1) / 2))
-        self.aspect = mi.Float(props.get("aspect", 1.0))
+        self.focal = read_number(props, "focal", positive=True)
+        self.centre_x = read_number(props, "centre_x", (self.width - 1) / 2)
+        self.centre_y = read_number(props, "centre_y", (self.height - 1) / 2)
+        self.aspect = read_number(props, "aspect", 1.0, positive=True)
         for name in DISTORTION:
-            setattr(self, name, mi.Float(props.get(name, 0.0)))
-        self.power = mi.Float(props.get("power", 1.0))
+            setattr(self, name, read_number(props, name, 0.0))
+        self.power = read_number(props, "power", 1.0)
         self.to_world = read_to_world(props)
         self._refresh()
 

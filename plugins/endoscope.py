@@ -7,7 +7,7 @@ from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction
 from mitsuba_endo.rendering.keys import LENSES
 from mitsuba_endo.rendering.untyped import dr, mi
 
-from .variants import make_opaque, pointer_to, read_to_world, variant_class
+from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 
 _INTRINSICS = ("fx", "fy", "cx", "cy")
 _MIN_COSINE = 0.01  # as in doe_projector
@@ -25,7 +25,7 @@ class Endoscope:
 
      * - fx, fy
        - |float|
-       - Focal lengths in pixels. (fy defaults to fx)
+       - Focal lengths in pixels, above 0. (fy defaults to fx)
        - |exposed|, |differentiable|
 
      * - cx, cy
@@ -88,13 +88,15 @@ class Endoscope:
         if self.model not in LENSES:
             expected = ", ".join(LENSES)
             raise RuntimeError(f'unknown "model" {self.model!r}, expected one of {expected}')
-        width, height = self.film().size()
-        self.fx = mi.Float(props["fx"])
-        self.fy = mi.Float(props.get("fy", props["fx"]))
-        self.cx = mi.Float(props.get("cx", (width - 1) / 2))
-        self.cy = mi.Float(props.get("cy", (height - 1) / 2))
+        width, height = (int(n) for n in self.film().size())
+        if width < 1 or height < 1:
+            raise RuntimeError(f'"width" and "height" of the film are {width} and {height} pixels')
+        self.fx = read_number(props, "fx", positive=True)
+        self.fy = read_number(props, "fy", props["fx"], positive=True)
+        self.cx = read_number(props, "cx", (width - 1) / 2)
+        self.cy = read_number(props, "cy", (height - 1) / 2)
         for name in LENSES[self.model]:
-            setattr(self, name, mi.Float(props.get(name, 0.0)))
+            setattr(self, name, read_number(props, name, 0.0))
         self.near_clip = float(props.get("near_clip", 1e-2))
         self.far_clip = float(props.get("far_clip", 1e4))
         if not 0 < self.near_clip < self.far_clip:

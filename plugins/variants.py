@@ -31,10 +31,25 @@ def read_to_world(props: Any) -> Any:
     to_world = props.get("to_world", mi.ScalarAffineTransform4d())
     if not is_rigid(to_world.matrix):
         raise RuntimeError('"to_world" must be a rotation and a translation, without any scale')
-    matrix = np.array(
-        to_world.matrix, np.float32
-    )  # XML gives double precision, variants use single
+    with np.errstate(over="ignore"):  # the check below tells it better
+        matrix = np.array(to_world.matrix, np.float32)  # XML gives double precision
+    if not np.isfinite(matrix).all():
+        raise RuntimeError('"to_world" must be finite in single precision')
     return mi.AffineTransform4f(mi.ScalarAffineTransform4f(matrix))
+
+
+def read_number(props: Any, name: str, default: float | None = None, positive: bool = False) -> Any:
+    """Return a number of a plugin's properties in single precision, as the variant's ``Float``.
+
+    Without a default the scene must give it. RuntimeError unless it is finite, and above 0 where
+    ``positive``: a projection with such a value renders nothing that makes sense, silently.
+    """
+    given = props[name] if default is None else props.get(name, default)
+    value = mi.Float(given)
+    if not dr.all(dr.isfinite(value) & (value > 0 if positive else True)):
+        wanted = "a finite number above 0" if positive else "a finite number"
+        raise RuntimeError(f'"{name}" must be {wanted}, got {given}')
+    return value
 
 
 def make_opaque(*values: Any) -> None:

@@ -250,6 +250,16 @@ def test_derivatives_of_the_light(law: str, name: str, llvm: str) -> None:
         ({"law": "fresnel"}, "law"),
         ({"width": 0}, "width"),
         ({"focl": 3.0}, "focl"),
+        ({"focal": 0.0}, '"focal" must be a finite number above 0, got 0'),
+        ({"focal": -38.0}, '"focal"'),
+        ({"focal": float("nan")}, '"focal"'),
+        ({"focal": 1e39}, '"focal"'),  # infinite in single precision
+        ({"aspect": -1.0}, '"aspect"'),
+        ({"aspect": float("inf")}, '"aspect"'),
+        ({"centre_x": float("nan")}, '"centre_x" must be a finite number, got nan'),
+        ({"centre_y": float("inf")}, '"centre_y"'),
+        ({"p2": float("nan")}, '"p2"'),
+        ({"power": float("inf")}, '"power"'),
     ],
 )
 def test_wrong_parameters_are_named(changes: dict, named: str, llvm: str) -> None:

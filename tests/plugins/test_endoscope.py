@@ -176,6 +176,15 @@ def test_rays_in_every_variant(name: str, any_variant: str) -> None:
         ({"lens": "pinhole"}, "lens"),
         ({"near_clip": 5.0, "far_clip": 1.0}, "near_clip"),
         ({"fxx": 1.0}, "fxx"),
+        ({"fx": 0.0}, '"fx" must be a finite number above 0, got 0'),
+        ({"fy": -34.5}, '"fy"'),
+        ({"fx": float("nan")}, '"fx"'),
+        ({"fy": float("inf")}, '"fy"'),
+        ({"cx": float("nan")}, '"cx" must be a finite number, got nan'),
+        ({"cy": float("inf")}, '"cy"'),
+        ({"k1": float("nan")}, '"k1"'),
+        ({"film": scenes.film(width=0)}, "film are 0 and 30 pixels"),
+        ({"film": scenes.film(height=0)}, "film are 44 and 0 pixels"),
     ],
 )
 def test_wrong_parameters_are_named(changes: dict, named: str, llvm: str) -> None:
