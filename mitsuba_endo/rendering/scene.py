@@ -149,6 +149,9 @@ def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[s
             f"it has {', '.join(declared)}" if declared else "it has no parameters at all",
         )
     values = declared | {name: str(value) for name, value in parameters.items()}
+    for name, value in values.items():
+        if "nan" in re.split(r"[\s,]+", value.strip().lower()):  # would only blacken the image
+            raise InputError(f"parameter {name!r} is {value}", str(source), "give it a number")
     with tempfile.TemporaryDirectory(prefix="mitsuba-endo-") as folder:
         resolved = {name: generate(name, value, Path(folder)) for name, value in values.items()}
         try:
@@ -193,8 +196,17 @@ def _declared(path: Path) -> dict[str, str]:
 
 
 def _message(error: BaseException) -> str:
-    """Return Mitsuba's message on one line, without the places in its source code."""
+    """Return Mitsuba's message on one line, without the places in its source code.
+
+    A plugin written in Python brings its whole traceback: of that the plugin's type is kept, and
+    what follows the exception's name.
+    """
     text = re.sub(r"\[\w+\.(cpp|h):\d+\]\s*", "", str(error))
+    before, traceback, raised = text.rpartition("Traceback (most recent call last):\n")
+    if traceback:
+        plugin = re.findall(r'plugin of type "([^"]+)"', before)
+        what = re.sub(r"\A(?:[ \t].*\n)*[\w.]+(?:: |\Z)", "", raised)
+        text = f"{plugin[-1]}: {what}" if plugin else what
     return re.sub(r"\s+", " ", text).strip().rstrip(".")
 
 

@@ -94,6 +94,10 @@ def test_image(capture: Path):
         (("sheet", "--set", "width"), "'width' is not name=value"),
         (("sheet", "--set", "widht=20"), "widht"),
         (("sheet", "--set", "law=pinole"), "pinole"),
+        (("sheet", "--set", "focal=nan"), "'focal' is nan"),
+        (("sheet", "--set", "focal=-300"), '"focal" must be a finite number above 0, got -300'),
+        (("sheet", "--set", "fx=0"), '"fx" must be a finite number above 0, got 0'),
+        (("sheet", "--set", "width=0"), "film are 0 and 360 pixels"),
         (("sheet", "--set", "surface=shape:sheep"), "sheep"),
     ],
 )
@@ -104,4 +108,5 @@ def test_bad_input(arguments: tuple[str, ...], expected: str, tmp_path: Path):
     assert len(result.stderr.splitlines()) == 1
     assert result.stderr.startswith("error: ")
     assert expected in result.stderr
+    assert "Traceback" not in result.stderr
     assert list(tmp_path.iterdir()) == []
