@@ -1,13 +1,20 @@
-"""Writing that is never seen half done: write aside, then rename."""
+"""Writing that is never seen half done: write aside, then rename. What damaged files raise."""
 
 import contextlib
 import os
 import shutil
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import InputError
+
+DAMAGED_NPZ = (
+    KeyError, IndexError, ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What reading an npz file raises that is cut off or holds other arrays than expected."""
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import atomic_path
+from ..files import DAMAGED_NPZ, atomic_path
 from ..geometry.transforms import RigidTransform
 
 FILE = "state.npz"
@@ -74,7 +74,8 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
     if not path.is_file():
         raise InputError("no such file", str(path), "name the folder of an earlier calibration")
     try:
-        with np.load(path, allow_pickle=False) as data:
+        # NumPy itself leaves a damaged file open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             names = [str(n) for n in data["names"]]
             surfaces = range(len(data["cells"]))
             return Checkpoint(
@@ -92,7 +93,7 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
                 projector_from_camera=_poses(data["projector_from_camera"]),
                 intrinsics=list(data["intrinsics"]),
             )
-    except (KeyError, ValueError, OSError, EOFError):
+    except DAMAGED_NPZ:
         raise InputError("is not a readable checkpoint", str(path), "start anew") from None
 
 

@@ -1,7 +1,5 @@
 """Correspondence maps: for each camera pixel the projector coordinate it sees."""
 
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import atomic_path
+from ..files import DAMAGED_NPZ, atomic_path
 
 CHANNELS = ("projector.x", "projector.y")
 WEIGHT = "weight"
@@ -153,7 +151,7 @@ def _read_npz(path: Path) -> _Read:
             weight = np.asarray(data[WEIGHT], np.float32) if WEIGHT in data else None
     except InputError:
         raise
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
+    except DAMAGED_NPZ:
         raise InputError("is not a readable npz file", str(path), "make it again") from None
     if q.ndim != 3 or q.shape[2] != 2 or q.dtype.kind not in "fiu":
         raise InputError(

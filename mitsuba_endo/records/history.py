@@ -1,7 +1,5 @@
 """Where an optimisation stood after its iterations, coarsely: for pictures of how it went."""
 
-import zipfile
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import atomic_path
+from ..files import DAMAGED_NPZ, atomic_path
 from ..geometry.transforms import RigidTransform
 from .calibration import Snapshot
 
@@ -110,7 +108,7 @@ def load_history(folder: str | Path) -> list[Snapshot]:
                 )
                 for i, mesh in enumerate(data["mesh"])
             ]
-    except (KeyError, ValueError, IndexError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
+    except DAMAGED_NPZ:
         raise InputError("is not a readable history", str(path), "delete it") from None
 
 

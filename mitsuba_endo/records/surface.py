@@ -1,7 +1,5 @@
 """The measured surface as a PLY file."""
 
-import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 import trimesh
 
 from ..errors import InputError
-from ..files import atomic_path
+from ..files import DAMAGED_NPZ, atomic_path
 from .calibration import SurfaceEstimate
 
 # Mitsuba asks for a postfix: it then offers the values as the mesh attribute `vertex_std`.
@@ -63,7 +61,7 @@ def load_with_modes(path: str | Path) -> SurfaceEstimate:
         # NumPy itself leaves a damaged file open.
         with beside.open("rb") as file, np.load(file, allow_pickle=False) as data:
             modes = data[path.name].astype(np.float64) if path.name in data else None
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error):
+    except DAMAGED_NPZ:
         raise InputError("is not a readable npz file", str(beside), "calibrate again") from None
     if modes is not None and len(modes) != len(surface.vertices):
         raise InputError(f"is not that of {path.name}", str(beside), "calibrate again")

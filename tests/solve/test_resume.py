@@ -170,3 +170,14 @@ def test_command_goes_on_from_a_folder(tmp_path: Path) -> None:
     missing = run(*common, "--out", tmp_path / "third", "--resume", tmp_path)
     assert missing.exit_code == 2
     assert "state.npz" in missing.stderr
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.3, 0.99])
+def test_a_file_that_is_cut_off(
+    case: tuple[Views, Rig, Calibration], tmp_path: Path, kept: float
+) -> None:
+    path = tmp_path / "state.npz"
+    save_checkpoint(path, checkpoint_of(case[2]))
+    path.write_bytes(path.read_bytes()[: int(kept * path.stat().st_size)])
+    with pytest.raises(InputError, match=r"state\.npz: is not a readable checkpoint"):
+        load_checkpoint(tmp_path)
