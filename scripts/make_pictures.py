@@ -46,7 +46,7 @@ def main(
         return
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
-        command = [sys.executable, "-m", "mitsuba_endo.cli.main", "demo", "--out", str(demo)]
+        command = [sys.executable, "-m", "mitsuba_endo", "demo", "--out", str(demo)]
         subprocess.run([*command, "--quiet"], check=True)
         _result(demo / "solution", out)
     _scenes(out)

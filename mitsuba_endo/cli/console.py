@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from ..errors import InputError
+from .entry import EXIT_INTERRUPTED, INTERRUPTED
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -23,7 +24,6 @@ EXIT_FAULT = 1
 """Done, but with a result to be wary of: not converged, or doctor found a fault."""
 EXIT_INTERNAL = 70
 """An unexpected exception (EX_SOFTWARE of sysexits.h)."""
-EXIT_INTERRUPTED = 130
 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON on stdout.")]
@@ -80,7 +80,7 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
             # with which CPython ends by the signal, whatever the exit code; the next exec wipes it
             # off.
             exec("")
-            _fail("interrupted; no output was left half written.", EXIT_INTERRUPTED, as_json)
+            _fail(INTERRUPTED, EXIT_INTERRUPTED, as_json)
         if isinstance(error, InputError):
             _fail(str(error), error.exit_code, as_json)
         if debug:

@@ -1,4 +1,4 @@
-"""Entry point of ``mitsuba-endo``."""
+"""The command line: every subcommand."""
 
 from typing import Annotated
 
@@ -59,12 +59,3 @@ def _root(
     ] = False,
 ) -> None:
     pass
-
-
-def main() -> None:
-    """Run the command line."""
-    app()
-
-
-if __name__ == "__main__":
-    main()

@@ -88,7 +88,7 @@ def refined(surface: SurfaceEstimate, triangles: int) -> SurfaceEstimate:
 @contextlib.contextmanager
 def _viewing(folder: Path) -> Iterator[str]:
     """Run the viewer and yield its address when it is printed."""
-    command = [sys.executable, "-m", "mitsuba_endo.cli.main", "view", str(folder), "--no-browser"]
+    command = [sys.executable, "-m", "mitsuba_endo", "view", str(folder), "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

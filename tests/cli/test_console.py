@@ -91,7 +91,7 @@ def test_help_loads_nothing_heavy():
 def test_help_is_fast():
     """Oracle: the processor time of the child; half a second is what feels immediate."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "mitsuba_endo.cli.main", "--help"]
+    command = [sys.executable, "-m", "mitsuba_endo", "--help"]
     text = subprocess.check_output(command, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert "calibrate" in text

@@ -12,7 +12,7 @@ import yaml
 
 from tests.dataset.small import contents_of, make_here, small_config
 
-COMMAND = [sys.executable, "-m", "mitsuba_endo.cli.main", "dataset"]
+COMMAND = [sys.executable, "-m", "mitsuba_endo", "dataset"]
 
 
 def write_config(folder: Path, **changes) -> Path:

@@ -74,7 +74,7 @@ def test_input_alone_gives_the_same_result(finished: tuple[Path, dict[str, Any]]
     """Oracle: the demo's solution, found again in a new process where no truth is in reach."""
     shutil.copytree(finished[0] / "input", tmp_path / "input")
     arguments = ["input/image.png", "--rig", "input/rig.yaml", "--out", "again", "--json"]
-    command = [sys.executable, "-m", "mitsuba_endo.cli.main", "calibrate", *arguments]
+    command = [sys.executable, "-m", "mitsuba_endo", "calibrate", *arguments]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     again = json.loads(done.stdout)["solution"]
@@ -103,7 +103,7 @@ def test_ctrl_c_leaves_the_output_absent_or_complete(tmp_path: Path):
     command = [
         sys.executable,
         "-m",
-        "mitsuba_endo.cli.main",
+        "mitsuba_endo",
         "demo",
         "--out",
         str(tmp_path / "out"),

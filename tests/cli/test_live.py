@@ -38,7 +38,7 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @contextlib.contextmanager
 def _live(capture: Path, out: Path, stdin: int = subprocess.DEVNULL) -> Iterator[subprocess.Popen]:
     """Run the command; its browser is one that does nothing."""
-    command = [sys.executable, "-m", "mitsuba_endo.cli.main", "calibrate", "--live",
+    command = [sys.executable, "-m", "mitsuba_endo", "calibrate", "--live",
                str(capture / "map.exr"), "--rig", str(capture / "rig.yaml"),
                "--out", str(out)]  # fmt: skip
     process = subprocess.Popen(

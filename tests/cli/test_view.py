@@ -19,7 +19,7 @@ from tests.show.conftest import make_calibration
 
 __all__ = ["make_calibration"]
 pytest.importorskip("viser")
-COMMAND = [sys.executable, "-m", "mitsuba_endo.cli.main", "view"]
+COMMAND = [sys.executable, "-m", "mitsuba_endo", "view"]
 
 
 def test_prints_its_address_and_ends_with_ctrl_c(
