@@ -2,6 +2,7 @@
 
 import socket
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -194,6 +195,42 @@ def test_taken_port_gives_the_next(server: Any):
     with running_server("localhost", server.get_port()) as other:
         assert other.get_port() != server.get_port()
         assert address(other) == f"http://localhost:{other.get_port()}"
+
+
+def test_address_in_version_6():
+    """Oracle: RFC 3986: brackets around it."""
+    fake = SimpleNamespace(get_host=lambda: "fe80::1", get_port=lambda: 8080)
+    assert address(fake) == "http://[fe80::1]:8080"
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "said"),
+    [
+        ("192.0.2.1", PORT, "cannot assign requested address"),
+        ("nowhere.invalid", PORT, "no such host"),
+        ("localhost", 65535, "address already in use"),
+    ],
+)
+def test_address_that_cannot_be_had(host: str, port: int, said: str):
+    """Oracle: 192.0.2.1 is kept for documentation (RFC 5737), so is .invalid, and the last port is
+    taken here. In a thread, because it once waited for ever."""
+    found: list[str] = []
+
+    def start() -> None:
+        try:
+            with running_server(host, port):
+                found.append("listens")
+        except InputError as error:
+            found.append(str(error))
+
+    with socket.socket() as taken:
+        taken.bind(("localhost", 65535))
+        taken.listen()
+        thread = threading.Thread(target=start, daemon=True)
+        thread.start()
+        thread.join(20)
+    todo = "give another --host or --port."
+    assert found == [f"{host}:{port}: cannot listen ({said}); {todo}"]
 
 
 def test_server_ends(calibration: Calibration):

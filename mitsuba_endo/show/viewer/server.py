@@ -1,15 +1,22 @@
 """The viewer's server: starting it, its address, and its end."""
 
+import asyncio
 import contextlib
+import errno
 import io
 import logging
+import os
+import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from ...errors import InputError
 
 TITLE = "mitsuba-endo"
+_TAKEN = (errno.EADDRINUSE, errno.EACCES)
+_LAST_PORT = 65535
 
 
 @contextlib.contextmanager
@@ -27,14 +34,9 @@ def running_server(host: str, port: int) -> Iterator[Any]:
         ) from None
     # A browser that leaves while it connects is no fault to show a traceback for.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
+    port = _free_port(host, port)
     with _silent():
-        try:
-            server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise InputError(
-                f"cannot listen ({reason})", f"{host}:{port}", "give another --host or --port"
-            ) from None
+        server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
     server.gui.configure_theme(
         control_layout="collapsible", control_width="large", show_logo=False,
         show_share_button=False, brand_color=(0, 114, 178),
@@ -46,10 +48,46 @@ def running_server(host: str, port: int) -> Iterator[Any]:
             server.stop()
 
 
+def _free_port(host: str, port: int) -> int:
+    """Return the first port from ``port`` on that can be listened at.
+
+    viser takes every fault for a taken port, and where none of its thousand tries succeeds it waits
+    for its own start for ever.
+
+    Raises:
+        InputError: ``host`` is no address of this machine, or its ports from there on are taken.
+    """
+    try:
+        with ThreadPoolExecutor(1) as thread:  # the caller may run an event loop, as notebooks do
+            return thread.submit(asyncio.run, _first_listening(host, port)).result()
+    except OSError as error:
+        unknown = isinstance(error, socket.gaierror)
+        reason = "no such host" if unknown else os.strerror(error.errno or 0).lower()
+        raise InputError(
+            f"cannot listen ({reason})", f"{host}:{port}", "give another --host or --port"
+        ) from None
+
+
+async def _first_listening(host: str, port: int) -> int:
+    """Return the first port at which asyncio, as viser uses it, can listen."""
+    for candidate in range(port, _LAST_PORT + 1):
+        try:
+            loop = asyncio.get_running_loop()
+            server = await loop.create_server(asyncio.Protocol, host, candidate)
+        except OSError as error:
+            if error.errno not in _TAKEN:
+                raise
+        else:
+            server.close()
+            return candidate
+    raise OSError(errno.EADDRINUSE, os.strerror(errno.EADDRINUSE))
+
+
 def address(server: Any) -> str:
     """Return what to type into a browser."""
     host = server.get_host()
-    return f"http://{'localhost' if host == '0.0.0.0' else host}:{server.get_port()}"
+    host = "localhost" if host in ("0.0.0.0", "::") else host
+    return f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
 
 
 def wait_for_interrupt() -> None:
