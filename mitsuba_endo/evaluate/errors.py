@@ -46,7 +46,8 @@ def evaluate(
             ``scale`` (about the first camera's centre) if the solution is up to scale.
 
     Raises:
-        InputError: frames that cannot be paired, or a named surface file that cannot be read.
+        InputError: frames that cannot be paired, images of different sizes, or a named surface file
+            that cannot be read.
     """
     pairs, matched_by = match_frames(solution, truth)
     metric = _metric(solution, truth)
@@ -72,8 +73,15 @@ def match_frames(
     By name, else by name without suffix, else by order where there are equally many.
 
     Raises:
-        InputError: neither way is possible.
+        InputError: neither way is possible, or the images are of different sizes.
     """
+    sizes = [(c.width, c.height) for c in (solution.camera, truth.camera) if c is not None]
+    if len(set(sizes)) > 1:
+        here, there = ("{} x {}".format(*size) for size in sizes)
+        raise InputError(
+            f"images of {there} pixels, but the solution's are {here}", "truth: camera",
+            "give the truth of the same capture",
+        )  # fmt: skip
     for name in (lambda f: f.name, lambda f: Path(f.name).stem):
         there = {name(f): f for f in truth.frames}
         unique = len(there) == len(truth.frames)

@@ -227,3 +227,13 @@ def test_matching(world: SimpleNamespace):
     assert _names(world, ["x", "y"], ["a", "b"]) == ([("x", "a"), ("y", "b")], "order")
     with pytest.raises(InputError, match="frame x: no frame of this name in the truth"):
         _names(world, ["x"], ["a", "b"])
+
+
+def test_images_of_another_size_are_refused(world: SimpleNamespace):
+    """Oracle: the size that the test gave the truth; a side without camera tells nothing."""
+    solution, truth = _record(world), _record(world)
+    assert truth.camera is not None
+    wider = truth.camera.model_copy(update={"width": 68})
+    with pytest.raises(InputError, match=r"camera: images of 68 x 45 .* solution's are 67 x 45; "):
+        evaluate(solution, truth.model_copy(update={"camera": wider}))
+    evaluate(solution, truth.model_copy(update={"camera": None}))
