@@ -17,10 +17,12 @@ def view(
     """Look at a result in 3D: iterations, rays, uncertainty, distances. Ends with Ctrl-C."""
     with session(quiet, as_json, debug) as output:
         from ..show.read_folder import read_solution_folder
-        from ..show.truth import find_truth
+        from ..show.truth import find_truth, read_truth
         from ..show.viewer import open_viewer, running_server, wait_for_interrupt
 
         calibration = read_solution_folder(result)
+        if truth is not None:
+            read_truth(truth, calibration.solution)  # refused before a browser opens
         found = truth or find_truth(result, calibration.solution)
         with running_server(host, port) as server:
             viewer = open_viewer(server, calibration, found)
@@ -29,6 +31,8 @@ def view(
             if viewer.comparison is not None:
                 viewer.comparison.join()
             for fault in viewer.faults or ():
+                if truth is not None:
+                    raise fault
                 output.print(f"The truth is left out: {fault}")
             wait_for_interrupt()
 

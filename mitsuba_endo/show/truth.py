@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..evaluate.depth import RayCaster
-from ..evaluate.errors import first_from_truth, match_frames
+from ..evaluate.errors import Pair, first_from_truth, match_frames
 from ..evaluate.shape import Alignment, alignment_of
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, SurfaceEstimate
@@ -56,16 +56,26 @@ def _is_decoded(solution: Solution, truth: Solution, folder: Path) -> bool:
     return len(truth.frames) == 1 and image.is_file()
 
 
+def read_truth(path: str | Path, solution: Solution) -> tuple[Solution, list[Pair]]:
+    """Read a truth's numbers; return them, and each frame of the solution with the true one.
+
+    Raises:
+        InputError: it cannot be read, or its frames or their size are not those of the solution.
+    """
+    truth = load_solution(path)
+    pairs, _ = match_frames(solution, truth)
+    return truth, pairs
+
+
 def load_truth(path: str | Path, calibration: Calibration) -> Truth:
     """Read a truth and bring it into the solution's unit.
 
     Raises:
-        InputError: it cannot be read, its frames are not those of the solution, or the solution is
-            up to scale and nothing tells the scale.
+        InputError: as :func:`read_truth`; its surface cannot be read; or the solution is up to
+            scale and nothing tells the scale.
     """
     path, solution = Path(path), calibration.solution
-    truth = load_solution(path)
-    pairs, _ = match_frames(solution, truth)
+    truth, pairs = read_truth(path, solution)
     same = truth.model_copy(update={"frames": [true for _, true in pairs]})
     moved = first_from_truth(truth, pairs[0][1])
     surface = None

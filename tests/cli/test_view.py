@@ -16,6 +16,7 @@ from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from tests.cli.inputs import run
 from tests.show.conftest import make_calibration
+from tests.show.test_truth import write_truth
 
 __all__ = ["make_calibration"]
 pytest.importorskip("viser")
@@ -54,4 +55,36 @@ def test_bad_input_is_one_sentence(tmp_path: Path):
     result = run("view", tmp_path / "absent", "--no-browser")
     assert result.exit_code == 2
     assert "absent" in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+# viser and the socket library under it; nothing of ours.
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda path: path.unlink(), "truth.json: no such file"),
+        (lambda path: path.write_text("{"), "truth.json: is not valid JSON"),
+        (lambda path: (path.parent / "truth.ply").unlink(), "truth.ply: no such file"),
+    ],
+)
+def test_given_truth_that_cannot_be_read_is_refused(
+    tmp_path: Path,
+    make_calibration: Callable[..., Calibration],
+    monkeypatch: pytest.MonkeyPatch,
+    spoil: Callable[[Path], object],
+    said: str,
+):
+    """Oracle: what the test took away, as `report` says it. Without the wait for Ctrl-C, at which
+    it would stay if it went on."""
+    monkeypatch.setattr("mitsuba_endo.show.viewer.wait_for_interrupt", lambda: None)
+    calibration = make_calibration(width=64, height=46)
+    write_solution_folder(tmp_path / "out", calibration)
+    path = write_truth(tmp_path / "elsewhere", calibration)
+    command = ("view", tmp_path / "out", "--no-browser", "--port", "18250", "--truth", path)
+    assert run(*command).exit_code == 0
+    spoil(path)
+    result = run(*command)
+    assert result.exit_code == 2
+    assert said in result.stderr
     assert result.stderr.count("\n") == 1

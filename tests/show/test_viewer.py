@@ -168,7 +168,7 @@ def test_truth_is_offered_when_it_is_loaded(server: Any, calibration: Calibratio
     assert wrong.comparison is not None
     wrong.comparison.join(60)
     assert wrong.faults is not None
-    assert "no such file" in wrong.faults[0]
+    assert "no such file" in str(wrong.faults[0])
 
 
 def test_live_view_shows_every_iteration(server: Any, calibration: Calibration):

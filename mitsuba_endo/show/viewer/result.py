@@ -21,7 +21,7 @@ class Viewer:
     controls: Controls
     comparison: threading.Thread | None = None
     """Loads the truth; Mitsuba, which it needs, takes longer to start than the viewer."""
-    faults: list[str] | None = None
+    faults: list[InputError] | None = None
     """Why there is no truth."""
 
 
@@ -32,13 +32,13 @@ def open_viewer(server: Any, calibration: Calibration, truth: Path | None = None
     controls = Controls(server, content, stage)
     if truth is None:
         return Viewer(content, stage, controls)
-    faults: list[str] = []
+    faults: list[InputError] = []
 
     def compare() -> None:
         try:
             content.compare(truth)
         except InputError as error:
-            faults.append(str(error))
+            faults.append(error)
             return
         controls.truth_is_known()
 
