@@ -31,12 +31,16 @@ def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
     """Write the report of solution folders, with the truth given or the one that lies with each.
 
     Raises:
-        InputError: a file is missing or damaged, or the truth is not that of its result.
+        InputError: a file is missing or damaged, the truth is not that of its result, or ``out``
+            is not called as a page is.
     """
+    from ..errors import InputError
     from ..show.read_folder import read_solution_folder
     from ..show.report import save_report
     from ..show.truth import find_truth
 
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise InputError("a report is HTML", str(out), "give --out a name that ends in .html")
     calibrations = [read_solution_folder(path) for path in results]
     truths = [
         truth or find_truth(path, calibration.solution)

@@ -198,5 +198,7 @@ def load_solution(path: str | Path) -> Solution:
     """
     path = Path(path)
     if path.is_dir():
-        path = path / ("solution.json" if (path / "solution.json").exists() else "truth.json")
+        name, other = "solution.json", "truth.json"
+        only_other = (path / other).exists() and not (path / name).exists()
+        path = path / (other if only_other else name)
     return validate(Solution, read_json(path), path.name)

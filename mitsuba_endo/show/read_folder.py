@@ -67,7 +67,7 @@ def read_solution_folder(path: str | Path) -> Calibration:
     folder = Path(path)
     if folder.name == "solution.json":
         folder = folder.parent
-    solution = load_solution(folder)
+    solution = load_solution(folder / "solution.json")
     if solution.camera is None or solution.surface is None:
         what = "camera" if solution.camera is None else "surface"
         raise InputError(f"{what} is missing", str(folder / "solution.json"), "calibrate again")
