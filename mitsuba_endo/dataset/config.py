@@ -341,7 +341,7 @@ def load_config(path: str | Path | None) -> Config:
     if path is None:
         return Config()
     path = Path(path)
-    config = validate(Config, read_yaml(path), path.name)
+    config = validate(Config, read_yaml(path), str(path))
     scenes = [
         scene
         if scene.file is None

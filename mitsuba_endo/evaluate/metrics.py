@@ -71,4 +71,4 @@ def load_metrics(path: str | Path) -> Metrics:
     Raises:
         InputError: names the file and field.
     """
-    return validate(Metrics, read_json(path), Path(path).name)
+    return validate(Metrics, read_json(path), str(path))

@@ -270,7 +270,7 @@ def load_rig(path: str | Path) -> Rig:
     camera = data.get("camera")
     if isinstance(camera, str):
         data["camera"] = _opencv_camera(path.parent / camera)
-    return validate(Rig, data, path.name)
+    return validate(Rig, data, str(path))
 
 
 def _opencv_camera(path: Path) -> Camera:
@@ -302,7 +302,7 @@ def _opencv_camera(path: Path) -> Camera:
         raise InputError("is not an OpenCV calibration", str(path), "check the file") from None
     finally:
         storage.release()
-    return validate(Camera, data, path.name)
+    return validate(Camera, data, str(path))
 
 
 def _first_node(storage: cv2.FileStorage, names: tuple[str, ...]) -> np.ndarray | None:

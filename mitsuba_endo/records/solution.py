@@ -201,4 +201,4 @@ def load_solution(path: str | Path) -> Solution:
         name, other = "solution.json", "truth.json"
         only_other = (path / other).exists() and not (path / name).exists()
         path = path / (other if only_other else name)
-    return validate(Solution, read_json(path), path.name)
+    return validate(Solution, read_json(path), str(path))

@@ -161,10 +161,10 @@ MIRROR = [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
     ],
 )  # fmt: skip
 def test_bad_field(tmp_path: Path, data: dict[str, Any], field: str, message: str):
-    """Oracle: the sentence names file and field exactly, and says what to do."""
+    """Oracle: the sentence names path and field exactly, and says what to do."""
     with pytest.raises(InputError) as caught:
         _load(tmp_path, data)
-    assert caught.value.where == f"rig.yaml: {field}"
+    assert caught.value.where == f"{tmp_path / 'rig.yaml'}: {field}"
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
     assert caught.value.todo
@@ -251,5 +251,5 @@ def test_bad_file_storage(tmp_path: Path, text: str | None, message: str):
         (tmp_path / "cam.yaml").write_text(text)
     with pytest.raises(InputError) as caught:
         _load(tmp_path, _with("camera", "cam.yaml"))
-    assert "cam.yaml" in str(caught.value.where)
+    assert str(caught.value.where).startswith(str(tmp_path / "cam.yaml"))
     assert message in str(caught.value)

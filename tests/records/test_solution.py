@@ -118,12 +118,12 @@ def test_nan_is_never_a_measured_value(bad: float):
     ],
 )
 def test_bad_solution_file(tmp_path: Path, change: dict, field: str, message: str):
-    """Oracle: the sentence names file and field."""
+    """Oracle: the sentence names path and field."""
     data = json.loads(_solution().model_dump_json(by_alias=True)) | change
     (tmp_path / "s.json").write_text(json.dumps(data))
     with pytest.raises(InputError) as caught:
         load_solution(tmp_path / "s.json")
-    assert caught.value.where == field
+    assert caught.value.where == str(tmp_path / field)
     assert message in str(caught.value)
 
 
@@ -139,5 +139,5 @@ def test_bad_json(tmp_path: Path, text: str, message: str):
 
 def test_empty_folder(tmp_path: Path):
     """Oracle: a sentence that names the file looked for."""
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="solution.json: no such file"):
         load_solution(tmp_path)
