@@ -219,7 +219,7 @@ def _pose(to_world: Any) -> RigidTransform:
 
 
 def _trimmed(lens: list[float], model: str) -> tuple[float, ...]:
-    """Leave out trailing zero coefficients, down to a number that OpenCV accepts."""
+    """Leave out trailing zero coefficients, down to a number that the model accepts."""
     from ..geometry.cameras import CAMERAS
 
     last = max((i + 1 for i, k in enumerate(lens) if k != 0), default=0)

@@ -53,6 +53,26 @@ def _without(field: str) -> dict[str, Any]:
     return data
 
 
+@pytest.mark.parametrize(
+    ("model", "most", "accepted"),
+    [("opencv", 9, [0, 1, 2, 3, 4, 5, 8]), ("opencv_fisheye", 5, [0, 1, 2, 3, 4])],
+)
+def test_numbers_of_coefficients(tmp_path: Path, model: str, most: int, accepted: list[int]):
+    """Oracle: docs/rig.md; those left out are 0, by the rays of a list that is filled up."""
+    pixels = np.array([[3.0, 300.0], [420.0, 17.0]])
+    for count in range(most + 1):
+        data = _with("camera.distortion", [0.01 * (k + 1) for k in range(count)])
+        data["camera"]["model"] = model
+        if count not in accepted:
+            with pytest.raises(InputError, match=f"{count} distortion coefficients do not fit"):
+                _load(tmp_path, data)
+            continue
+        rays = _load(tmp_path, data).camera.to_model().rays(pixels)
+        data["camera"]["distortion"] += [0.0] * (accepted[-1] - count)
+        filled = _load(tmp_path, data).camera.to_model().rays(pixels)
+        np.testing.assert_allclose(rays, filled, atol=1e-12)
+
+
 def test_full_file(tmp_path: Path):
     """Oracle: the values written into the file."""
     rig = _load(tmp_path, _data())

@@ -139,5 +139,5 @@ def test_bad_json(tmp_path: Path, text: str, message: str):
 
 def test_empty_folder(tmp_path: Path):
     """Oracle: a sentence that names the file looked for."""
-    with pytest.raises(InputError, match="solution.json: no such file"):
+    with pytest.raises(InputError, match=r"solution\.json: no such file"):
         load_solution(tmp_path)
