@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..show.numbers import INTERVAL
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -24,6 +26,7 @@ METRICS = {
 """What of :class:`Metrics` is shown, with the unit."""
 
 
+INTERVAL_COLUMN = "± (95 %)"
 _ROUNDING = 1e-12
 
 
@@ -31,7 +34,7 @@ def solution_table(solution: "Solution") -> "Table":
     """List the unknowns with their units; poses axis by axis for one frame, else a row a frame."""
     from rich.text import Text
 
-    table = _table("Calibration", "Quantity", "Value", "± std", "Unit", "Status")
+    table = _table("Calibration", "Quantity", "Value", INTERVAL_COLUMN, "Unit", "Status")
     projector = solution.projector
     for name, unit in (
         ("focal", "pattern px"), ("centre", "pattern px"), ("aspect", "fy/fx"), ("distortion", ""),
@@ -61,13 +64,13 @@ def solution_table(solution: "Solution") -> "Table":
 
 def _estimate_rows(table: "Table", name: str, estimate: "Estimate", unit: str) -> None:
     if not isinstance(estimate.value, list):
-        std = numbers(estimate.std, 2)
-        table.add_row(name, numbers(estimate.value), std, unit, estimate.status)
+        std = estimate.std if isinstance(estimate.std, float) else None
+        table.add_row(name, numbers(estimate.value), _half(std), unit, estimate.status)
         return
     stds = estimate.std if isinstance(estimate.std, list) else [None] * len(estimate.value)
     parts = "xy" if name == "centre" else [str(i + 1) for i in range(len(estimate.value))]
     for part, value, std in zip(parts, estimate.value, stds, strict=True):
-        table.add_row(f"{name} {part}", numbers(value), numbers(std, 2), unit, estimate.status)
+        table.add_row(f"{name} {part}", numbers(value), _half(std), unit, estimate.status)
 
 
 def _pose_rows(table: "Table", pose: "PoseEstimate", unit: str, short: bool) -> None:
@@ -80,16 +83,21 @@ def _pose_rows(table: "Table", pose: "PoseEstimate", unit: str, short: bool) -> 
         degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
         for axis, value, s in zip("xyz", _rotation_degrees(transform.R), degrees, strict=True):
             name = f"projector rotation {axis}"
-            table.add_row(name, numbers(value, 5), numbers(s, 2), "deg", pose.status)
+            table.add_row(name, numbers(value, 5), _half(s), "deg", pose.status)
         for axis, value, s in zip("xyz", transform.t.tolist(), std[3:], strict=True):
             name = f"projector translation {axis}"
-            table.add_row(name, numbers(value, 5), numbers(s, 2), unit, pose.status)
+            table.add_row(name, numbers(value, 5), _half(s), unit, pose.status)
 
 
 def _rotation_degrees(R: np.ndarray) -> list[float]:
     from scipy.spatial.transform import Rotation
 
     return np.degrees(Rotation.from_matrix(R).as_rotvec()).tolist()
+
+
+def _half(std: float | None) -> str:
+    """Format half of a 95 % interval."""
+    return numbers(None if std is None else INTERVAL * std, 2)
 
 
 def numbers(value: float | list[float] | None, digits: int = 6) -> str:
@@ -112,10 +120,13 @@ def _table(title: str, *columns: str) -> "Table":
 
 def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     """Set what was found beside the truth, for the first frame."""
-    table = _table("Projector, found and true", "Quantity", "Found", "± std", "True", "Unit")
+    table = _table(
+        "Projector, found and true", "Quantity", "Found", INTERVAL_COLUMN, "True", "Unit"
+    )
     focal, true_focal = solution.projector.focal, truth.projector.focal
     table.add_row(
-        "focal length", numbers(focal.value), numbers(focal.std, 2),
+        "focal length", numbers(focal.value),
+        _half(focal.std if isinstance(focal.std, float) else None),
         numbers(true_focal.value), "pattern px",
     )  # fmt: skip
     estimate = solution.frames[0].projector_from_camera
@@ -126,11 +137,11 @@ def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
     angles = zip("xyz", _rotation_degrees(found.R), degrees, _rotation_degrees(true.R), strict=True)
     for axis, value, s, is_true in angles:
-        row = numbers(value, 4), numbers(s, 2), numbers(is_true, 4), "deg"
+        row = numbers(value, 4), _half(s), numbers(is_true, 4), "deg"
         table.add_row(f"rotation {axis}", *row)
     lengths = zip("xyz", found.t.tolist(), std[3:], true.t.tolist(), strict=True)
     for axis, value, s, is_true in lengths:
-        row = numbers(value, 4), numbers(s, 2), numbers(is_true, 4), solution.units
+        row = numbers(value, 4), _half(s), numbers(is_true, 4), solution.units
         table.add_row(f"translation {axis}", *row)
     return table
 

@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 
 from mitsuba_endo.cli.calibrate import exit_code, load_input, with_sharing
-from mitsuba_endo.cli.summary import solution_table
+from mitsuba_endo.cli.summary import comparison_table, solution_table
 from mitsuba_endo.records.rig import Rig
-from mitsuba_endo.records.solution import Outcome, Solution
+from mitsuba_endo.records.solution import Estimate, Outcome, Solution
 from tests.cli.inputs import q, rig, write
 
 
@@ -61,6 +61,28 @@ def test_given_baseline_is_not_called_measured(scale: str, status: str):
     assert isinstance(console.file, StringIO)
     row = next(line for line in console.file.getvalue().splitlines() if "baseline" in line)
     assert status in row
+
+
+@pytest.mark.parametrize("compared", [False, True])
+def test_tables_show_95_percent_intervals(compared: bool):
+    """Oracle: docs/conventions.md: ± is 1.96 standard deviations; those are 2 here, and 0.5 for the
+    translation."""
+    solution = _solution(Outcome.CONVERGED, "baseline")
+    focal = Estimate(value=300.0, std=2.0, status="measured")
+    projector = solution.projector.model_copy(update={"focal": focal})
+    pose = solution.frames[0].projector_from_camera.model_copy(
+        update={"std": [np.radians(2.0)] * 3 + [0.5] * 3}
+    )
+    frames = [solution.frames[0].model_copy(update={"projector_from_camera": pose})]
+    solution = solution.model_copy(update={"projector": projector, "frames": frames})
+    console = Console(file=StringIO(), width=100)
+    console.print(comparison_table(solution, solution) if compared else solution_table(solution))
+    assert isinstance(console.file, StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert any("± (95 %)" in line for line in lines)
+    for quantity, half in (("focal", "3.9"), ("rotation y", "3.9"), ("translation x", "0.98")):
+        (row,) = [line for line in lines if quantity in line]
+        assert row.split("│")[3].strip() == half, row
 
 
 def test_share_changes_only_what_it_names():
