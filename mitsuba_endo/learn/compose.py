@@ -10,11 +10,24 @@ from ..capture.effects import apply_effects
 from ..capture.settings import Effects
 from ..decode.grid_pattern import COLOURS
 from .patterns import GridTexture
+from .scattering import spread
 from .textures import albedo, highlights
-from .views import BIT_EDGE, BIT_HIT, BIT_MIXED, LATTICE_UNIT, SUPERSAMPLE, UNLIT, View
+from .views import (
+    BIT_EDGE,
+    BIT_HIT,
+    BIT_MIXED,
+    LATTICE_UNIT,
+    LEAST_FACING,
+    SUPERSAMPLE,
+    UNLIT,
+    View,
+)
 
 VISIBLE = 0.01
 """Share of full scale that a line must reach for its pixel to count as lit."""
+HARSH = 0.4
+"""Share of images underexposed and full of speckle: what is decoded of dark folds is learned there,
+and few images are both by chance."""
 NEAR_NODE = 0.3
 """Periods, per axis, within which the node's code is asked for."""
 
@@ -38,9 +51,11 @@ class Look:
     """Surface and light of one image; all that the camera itself does is in Effects."""
 
     scatter: float
-    """Share of the laser's light that comes out beside its entry."""
-    scatter_px: float
-    """Standard deviation of that, pixels, for its narrower half; the wider is 2.5 times it."""
+    """Share of the laser's light that goes through the tissue."""
+    free_path: float
+    """Reduced mean free path there, pixels, where the tissue is nearest."""
+    reflectance: float
+    """Of the tissue: the brighter, the farther light spreads."""
     between: float
     """Light reflected from wall to wall, relative to the laser's."""
     lamp: float
@@ -53,10 +68,11 @@ class Look:
 
 def random_look(rng: np.random.Generator) -> Look:
     """Draw how tissue and lamp look."""
-    u, soft = rng.uniform, rng.random() < 0.6
+    u, soft = rng.uniform, rng.random() < 0.75
     return Look(
-        scatter=u(0.2, 0.95) if soft else 0.0,
-        scatter_px=float(np.exp(u(np.log(0.7), np.log(2.6)))),
+        scatter=u(0.5, 1) if soft else 0.0,
+        free_path=float(np.exp(u(np.log(0.5), np.log(4)))),
+        reflectance=u(0.2, 0.6),
         between=u(0, 0.25) if rng.random() < 0.7 else 0.0,
         lamp=float(np.exp(u(np.log(0.02), np.log(0.8)))) if rng.random() < 0.5 else 0.0,
         wet=float(np.exp(u(np.log(0.3), np.log(6)))) if rng.random() < 0.6 else 0.0,
@@ -67,16 +83,19 @@ def random_look(rng: np.random.Generator) -> Look:
 def random_effects(rng: np.random.Generator) -> Effects:
     """Draw what camera and laser do, from clean to heavy corruption."""
     u, heavy = rng.uniform, rng.random()
+    harsh = heavy > 1 - HARSH
+    contrast = u(0.45, 0.85) if harsh else u(0, 0.85) * (heavy > 0.25)
+    exposure = (0.2, 0.6) if harsh else (0.18, 1.3)
     return Effects(
         vignetting=u(0, 1.2),
         defocus=0.0 if heavy < 0.1 else abs(rng.normal(0.5, 0.35)),
         motion=u(0.5, 4) if rng.random() < 0.2 else 0.0,
         motion_angle=u(0, 3.14),
         # Rounded: the table behind each contrast is kept.
-        speckle_contrast=round(u(0, 0.85) * (heavy > 0.25), 2),
+        speckle_contrast=round(contrast, 2),
         speckle_grain=u(1.0, 2.6),
-        exposure=float(np.exp(u(np.log(0.18), np.log(1.3)))),
-        colour="colour" if rng.random() < 0.45 else "gray",
+        exposure=float(np.exp(u(*np.log(exposure)))),
+        colour="colour" if rng.random() < 0.55 else "gray",
         shot=float(np.exp(u(np.log(800), np.log(30000)))),
         read_noise=u(0, 16),
         gamma=float(rng.choice([1.0, 1.8, 2.2])),
@@ -120,7 +139,7 @@ def compose(
     shading = view.shading.astype(np.float32)
     tissue = albedo((h, w), rng)
     strength = tissue * shading[..., 0]
-    laser = _scattered(pattern * strength, look)
+    laser = _scattered(pattern * strength, shading, look)
     lamp = look.lamp * tissue * shading[..., 1]
     wet = np.zeros((h, w), np.float32)
     if look.wet:
@@ -158,12 +177,14 @@ def _lattice(view: View, grid: GridTexture, rng: np.random.Generator) -> NDArray
     return lattice
 
 
-def _scattered(light: NDArray[np.float32], look: Look) -> NDArray[np.float32]:
+def _scattered(
+    light: NDArray[np.float32], shading: NDArray[np.float32], look: Look
+) -> NDArray[np.float32]:
     """Spread the laser's light inside the tissue and from wall to wall."""
     if look.scatter:
-        near = cv2.GaussianBlur(light, (0, 0), look.scatter_px)
-        far = cv2.GaussianBlur(light, (0, 0), 2.5 * look.scatter_px)
-        inside = cv2.addWeighted(near, 0.6, far, 0.4, 0)
+        # The lamp's light falls with the squared distance.
+        nearness = np.sqrt(shading[..., 1] / np.maximum(shading[..., 2], LEAST_FACING))
+        inside = spread(light, nearness, look.free_path, look.reflectance)
         light = _sum(light, 1 - look.scatter, inside, look.scatter)
     if look.between:
         light = _sum(light, 1, cv2.blur(light, (61, 61)), look.between)

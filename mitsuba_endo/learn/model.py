@@ -28,7 +28,7 @@ class DecoderNet(nn.Module):
     convolution and no pixel shuffle: OpenCV's network module is slow at one and wrong at the other.
     """
 
-    def __init__(self, widths: tuple[int, ...] = (32, 48, 80, 128), head: int = 24) -> None:
+    def __init__(self, widths: tuple[int, ...] = (32, 48, 96, 160), head: int = 24) -> None:
         super().__init__()
         self.stem = nn.Sequential(
             nn.Conv2d(INPUT_CHANNELS, widths[0], 4, stride=2, padding=1, bias=False),

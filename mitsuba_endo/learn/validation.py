@@ -45,7 +45,8 @@ def validation_images(views: ViewCache) -> list[ValidationImage]:
 
 def clean_image() -> tuple[Look, Effects]:
     """Return dry tissue, sharp and well exposed."""
-    look = Look(scatter=0.3, scatter_px=0.8, between=0.05, lamp=0.05, wet=0.0, tint=(2, 0.8))
+    look = Look(scatter=0.9, free_path=1.0, reflectance=0.35, between=0.05, lamp=0.05, wet=0.0,
+                tint=(2, 0.8))  # fmt: skip
     effects = Effects(vignetting=0.5, defocus=0.5, speckle_contrast=0.0, exposure=1.0,
                       colour="gray", shot=20000, read_noise=4)  # fmt: skip
     return look, effects
@@ -54,8 +55,8 @@ def clean_image() -> tuple[Look, Effects]:
 def heavy_image(rng: np.random.Generator) -> tuple[Look, Effects]:
     """Return wet tissue with speckle contrast 0.5 to 0.8 and exposure 0.3 to 0.5."""
     u = rng.uniform
-    look = Look(scatter=u(0.3, 0.8), scatter_px=u(0.8, 1.6), between=0.15, lamp=u(0.05, 0.3),
-                wet=3, tint=(2, 0.8))  # fmt: skip
+    look = Look(scatter=u(0.7, 1), free_path=u(1, 2.5), reflectance=0.35, between=0.15,
+                lamp=u(0.05, 0.3), wet=3, tint=(2, 0.8))  # fmt: skip
     effects = Effects(
         vignetting=1.0, defocus=u(0.4, 0.8), motion=u(0, 1.5), motion_angle=u(0, 3.14),
         speckle_contrast=round(u(0.5, 0.8), 2), speckle_grain=u(1.2, 2.2), exposure=u(0.3, 0.5),

@@ -18,6 +18,8 @@ MIXED = 0.25
 """Periods per pixel; where lattice coordinates change faster a pixel has no one truth."""
 JUMP = 0.6
 """Periods per pixel that count as a depth edge."""
+LEAST_FACING = 0.03
+"""Cosine to which Lambert's law is followed: relief lights even a wall that is seen edge on."""
 LATTICE_UNIT = 1e-3
 UNLIT = -32768
 BIT_MIXED, BIT_EDGE, BIT_HIT = 1, 2, 4
@@ -93,9 +95,9 @@ def _shading(points: NDArray[np.float64], placement: Placement) -> NDArray[np.fl
     to_source, far = _unit(source - at)
     half, _ = _unit(to_camera + to_source)
     facing = np.einsum("hwi,hwi->hw", normal, to_camera)
-    lambert = np.clip(np.einsum("hwi,hwi->hw", normal, to_source), 0.03, 1)
+    lambert = np.clip(np.einsum("hwi,hwi->hw", normal, to_source), LEAST_FACING, 1)
     laser = _relative(lambert / far**2)
-    lamp = _relative(np.clip(facing, 0.03, 1) / distance**2)
+    lamp = _relative(np.clip(facing, LEAST_FACING, 1) / distance**2)
     mirror = np.einsum("hwi,hwi->hw", normal, half)
     stacked = np.stack([laser, lamp, np.clip(facing, 0, 1), np.clip(mirror, 0, 1)], -1)
     return np.nan_to_num(stacked).astype(np.float16)

@@ -14,7 +14,7 @@ from mitsuba_endo.learn.textures import clouds, without_pattern
 from mitsuba_endo.learn.views import LATTICE_UNIT, UNLIT
 from tests.learn.cached import step_cache
 
-DRY = Look(scatter=0, scatter_px=1, between=0, lamp=0, wet=0, tint=(2, 0.8))
+DRY = Look(scatter=0, free_path=1, reflectance=0.4, between=0, lamp=0, wet=0, tint=(2, 0.8))
 PLAIN = Effects(vignetting=0, defocus=0, speckle_contrast=0, shot=None, gamma=1, colour="gray",
                 bits=16)  # fmt: skip
 
