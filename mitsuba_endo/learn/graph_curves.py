@@ -22,7 +22,7 @@ from .graph_model import GraphNet
 
 WRONG = 0.5
 """Periods of error on an axis from which a pixel is in a wrong period."""
-THRESHOLDS = np.round(np.arange(0.35, 0.96, 0.05), 2)
+THRESHOLDS = np.round(np.arange(0.5, 0.96, 0.05), 2)
 """Confidence asked of a pixel; below the first the decoder keeps none."""
 LEAST_ODDS, SURE_ODDS = np.log(0.1 / 0.9), 5.0
 """Logs of the odds of a link that is kept, and of one that costs the full price to cut."""

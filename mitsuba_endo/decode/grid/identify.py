@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from .beside import vote_beside
 from .graph import GridGraph, components
 from .identity import Identity
-from .links import Links
 from .pendants import with_pendants
 from .potts import cut
+from .surroundings import without_misfits
 from .vote import Placement, Vote, evidence, scores_at, vote
 from .windows import candidates
 
@@ -70,6 +70,7 @@ def identify(graph: GridGraph, pattern: NDArray[np.int8]) -> Identity:
     parts = _accepted(_same_way_up(parts), MIN_SHARE_OF_ALL * tried)
     parts += _beside(graph, parts, logs, pattern)
     identity = _without_doubles(graph, parts, logs, pattern)
+    identity = without_misfits(graph, identity, logs, pattern, SLIPS)
     return with_pendants(graph, identity, logs, pattern)
 
 
@@ -87,7 +88,7 @@ def _parts(
     cost = np.stack([-scores_at(label, place, known, pattern) for label in labels], -1)
     # The last label stands for "none of them", at little more than the evidence of chance.
     cost = np.concatenate([cost, np.full((len(members), 1), -LEAST)], axis=1)
-    links = _within(graph.links, members, len(graph.nodes))
+    links = graph.links.among(members, len(graph.nodes))
     price = LINK_COST * (WEAKEST + (1 - WEAKEST) * links.quality)
     label = cut(cost, links.start, links.end, price)
     same = links.chosen(
@@ -109,15 +110,6 @@ def _parts(
 def _convincing(found: Vote, nodes: int) -> bool:
     well_read = found.score >= MIN_SCORE * nodes and found.margin >= MIN_MARGIN
     return well_read or min(found.score, found.margin) >= SURE
-
-
-def _within(links: Links, members: NDArray[np.intp], count: int) -> Links:
-    """Return the links between members, whose nodes are numbered by their place among them."""
-    number = np.full(count, -1)
-    number[members] = np.arange(len(members))
-    start, end = number[links.start], number[links.end]
-    inside = Links(start, end, links.axis, links.quality)
-    return inside.chosen((start >= 0) & (end >= 0))
 
 
 def _accepted(parts: list[_Part], needed: float) -> list[_Part]:

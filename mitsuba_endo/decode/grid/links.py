@@ -50,6 +50,14 @@ class Links:
         """Return the links for which ``which`` (L,) holds."""
         return Links(self.start[which], self.end[which], self.axis[which], self.quality[which])
 
+    def among(self, members: NDArray[np.intp], count: int) -> "Links":
+        """Return the links between some of ``count`` nodes, numbered by their place among these."""
+        number = np.full(count, -1)
+        number[members] = np.arange(len(members))
+        start, end = number[self.start], number[self.end]
+        inside = Links(start, end, self.axis, self.quality)
+        return inside.chosen((start >= 0) & (end >= 0))
+
 
 @dataclass(frozen=True, eq=False)
 class Measures:

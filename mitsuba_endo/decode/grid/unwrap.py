@@ -10,7 +10,7 @@ from .identity import Identity
 from .nodes import Nodes, larger, phase_slope
 from .planes import drawn_to_planes
 
-MIN_CONFIDENCE = 0.35
+MIN_CONFIDENCE = 0.5
 MAX_EDGE = 0.8
 ROUNDS = 2
 """Cells without a node of their own are reached from placed ones in so many steps."""
