@@ -60,7 +60,7 @@ def _frame(frame: Frame, units: str, gives_scale: bool) -> list[Row]:
         used = "" if frame.used is None else f"{frame.used} pixels used"
         out.append(Row(frame.name, "residual, RMS", f"{frame.rms_px:.3g}", "", "pattern px", used))
     if frame.outliers is not None:
-        out.append(Row(frame.name, "outliers", f"{100 * frame.outliers:.2g}", "", "%", ""))
+        out.append(Row(frame.name, "pixels not used", f"{100 * frame.outliers:.2g}", "", "%", ""))
     return out
 
 

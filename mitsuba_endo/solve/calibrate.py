@@ -80,15 +80,16 @@ def solve_each(jobs: list[Job], say: Progress) -> list[Fit]:
     """
     parts = 2 * len(jobs) if len(jobs) > 1 else 1  # one law has no others to start from
     done = _part(say, parts, parts)
+    stopping = _part(lambda share, step: say(share, f"Stopping: {step.lower()}"), parts, parts)
     found: list[Found] = []
     for i, job in enumerate(jobs):
         found.append(search(job, _part(say, i, parts)))
         if found[-1].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[-1], done)]
+            return [finish(job, found[-1], stopping)]
     for i, job in enumerate(jobs):
         found[i] = _from_others(job, i, found, _part(say, len(jobs) + i, parts))
         if found[i].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[i], done)]
+            return [finish(job, found[i], stopping)]
     return [finish(job, f, done) for job, f in zip(jobs, found, strict=True)]
 
 
