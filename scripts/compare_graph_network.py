@@ -19,7 +19,7 @@ import typer
 from mitsuba_endo import backend
 from mitsuba_endo.decode.grid.network import Network, load_network
 from mitsuba_endo.learn.cache import CacheSettings, open_cache
-from mitsuba_endo.learn.graph_curves import Case, curves, save_comparison
+from mitsuba_endo.learn.graph_curves import METHODS, Case, curves, save_comparison
 from mitsuba_endo.learn.graph_loop import GraphPlan, graphs_of, train_graph_net
 from mitsuba_endo.learn.patterns import grid_texture
 from mitsuba_endo.learn.validation import UNSEEN, validation_images
@@ -57,9 +57,10 @@ def main(
     cases = [*_validation(out / "validation", unseen, network), *_traced(traced, network)]
     found = curves(cases, net)
     save_comparison(out / "graph_network.png", found)
-    typer.echo("| images | rules: coverage | wrong period | graph network: coverage | wrong |")
+    typer.echo("| images | coverage | wrong periods: " + " | ".join(METHODS) + " |")
     for scenario, methods in found.items():
-        values = [f"{100 * x[0]:.2f} %" for c in methods.values() for x in (c.coverage, c.wrong)]
+        both = min(curve.coverage[0] for curve in methods.values())
+        values = [f"{100 * both:.1f} %", *(f"{100 * c.at(both):.2f} %" for c in methods.values())]
         typer.echo(f"| {scenario} | {' | '.join(values)} |")
 
 

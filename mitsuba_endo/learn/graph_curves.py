@@ -104,16 +104,18 @@ def _curve(counts: Sequence[NDArray[np.float64]]) -> Curve:
 def save_comparison(path: Path, found: Mapping[str, Mapping[str, Curve]]) -> None:
     """Draw the curves, one panel a scenario."""
     columns = min(len(found), 4)
-    figure = Figure(figsize=(3.2 * columns, 3.2), dpi=110, layout="constrained")
-    for axes, (scenario, methods) in zip(
-        figure.subplots(1, columns, squeeze=False).flat, found.items(), strict=True
-    ):
+    rows = -(-len(found) // columns)
+    figure = Figure(figsize=(3.2 * columns, 3.2 * rows), dpi=110, layout="constrained")
+    panels = figure.subplots(rows, columns, squeeze=False).flat
+    for (scenario, methods), axes in zip(found.items(), panels, strict=False):
         for method, curve in methods.items():
             axes.plot(100 * curve.coverage, 100 * curve.wrong, ".-", label=method)
         axes.set_title(scenario, fontsize=10)
         axes.set_xlabel("coverage (%)")
         axes.set_ylim(bottom=0)
         axes.grid(alpha=0.3)
+    for axes in panels:  # those that are left
+        axes.remove()
     figure.axes[0].set_ylabel("wrong period (%)")
     figure.axes[0].legend(fontsize=8)
     with atomic_path(path) as aside:

@@ -1,5 +1,8 @@
 """The graph network's examples, training and comparison, on grids whose links are known."""
 
+from pathlib import Path
+
+import cv2
 import numpy as np
 import pytest
 
@@ -11,7 +14,14 @@ from mitsuba_endo.decode.gap_code import gap_code
 from mitsuba_endo.decode.grid.heads import Heads, smoothed
 from mitsuba_endo.decode.grid.nodes import find_nodes
 from mitsuba_endo.learn.compose import Truth
-from mitsuba_endo.learn.graph_curves import Case, curves
+from mitsuba_endo.learn.graph_curves import (
+    METHODS,
+    THRESHOLDS,
+    Case,
+    Curve,
+    curves,
+    save_comparison,
+)
 from mitsuba_endo.learn.graph_loop import GraphPlan, joined, train_graph_net
 from mitsuba_endo.learn.graphs import labelled_graph
 
@@ -71,3 +81,16 @@ def test_curves_of_an_easy_grid():
     for curve in found.values():
         assert curve.wrong.max() == 0
         assert curve.coverage[0] > 0.85
+
+
+def test_picture_of_many_scenarios(tmp_path: Path):
+    """Oracle: by hand; four panels a row, the last ones left white."""
+    falling = np.linspace(0.9, 0.5, len(THRESHOLDS))
+    curve = Curve(falling, 0.01 * falling)
+    assert curve.at(0.7) == pytest.approx(0.007)
+    save_comparison(tmp_path / "c.png", {f"s{k}": dict.fromkeys(METHODS, curve) for k in range(5)})
+    picture = cv2.imread(str(tmp_path / "c.png"))
+    height, width = picture.shape[:2]
+    assert width / height == pytest.approx(2, abs=0.05)
+    assert (picture[height // 2 + 20 :, width // 3 :] == 255).all()
+    assert (picture[height // 2 + 20 :, : width // 4] < 255).any()
