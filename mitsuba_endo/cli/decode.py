@@ -66,8 +66,8 @@ def decode(
 ) -> None:
     """Decode images of the coded grid into correspondence maps, one a frame.
 
-    NAME.exr is the map with the confidence as third channel, NAME_graph.png the grid found. An
-    image without this pattern gets no map; if that is every one, the exit code is 3.
+    NAME.exr is the map, with confidence and weight beside the coordinates; NAME_graph.png shows the
+    grid found. An image without this pattern gets no map; if that is every one, the exit code is 3.
     """
     with session(quiet, as_json, debug) as output:
         from ..files import atomic_folder, check_output_folder
@@ -110,9 +110,8 @@ def decode_into(
         for frame in _sized(read_frames(images), rig):
             advance(0.0, f"Decoding {frame.name}")
             result = decode_image(frame.image, network, grid)
-            linked = int((result.graph.component >= 0).sum())
-            placed = int(result.identity.placed.sum())
-            found.append(Summary(frame.name, linked, placed, result.coverage, result.reason))
+            placed, coverage = int(result.identity.placed.sum()), result.coverage
+            found.append(Summary(frame.name, result.nodes, placed, coverage, result.reason))
             _write(folder, frame, result)
     return found
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from mitsuba_endo.decode.gap_code import gap_code
+from mitsuba_endo.decode.grid.decode import DecodedGrid
 from mitsuba_endo.decode.grid.graph import GridGraph
 from mitsuba_endo.decode.grid.identity import Identity
 from mitsuba_endo.decode.grid.links import Links
@@ -18,8 +19,8 @@ LOOSE = np.array([[3, 4, 0], [4, 5, 0], [2, 6, 1]])
 """Start, end, axis."""
 
 
-def placed(misread: int | None = None, quality: float = 0.9, turn: int = 1) -> Identity:
-    """Return who is placed, where one node's code may be misread."""
+def decoded(misread: int | None = None, quality: float = 0.9, turn: int = 1) -> DecodedGrid:
+    """Return what is placed, where one node's code may be misread; no pixels."""
     true = TRUE if turn == 1 else np.array(PATTERN.shape[::-1]) - 1 - TRUE
     code = 1 - PATTERN[true[:, 1], true[:, 0]]
     if misread is not None:
@@ -33,7 +34,12 @@ def placed(misread: int | None = None, quality: float = 0.9, turn: int = 1) -> I
     inside = np.arange(len(TRUE)) < QUAD
     graph = GridGraph(nodes, none, loose, np.where(inside, 0, -1), TRUE)
     known = Identity(inside, np.where(inside[:, None], true, -1), turn, 1.0)
-    return with_pendants(graph, known, evidence(probable), PATTERN)
+    found = with_pendants(graph, known, evidence(probable), PATTERN)
+    return DecodedGrid(np.zeros((0, 0, 2)), np.zeros((0, 0)), graph, found, "")
+
+
+def placed(misread: int | None = None, quality: float = 0.9, turn: int = 1) -> Identity:
+    return decoded(misread, quality, turn).identity
 
 
 def test_right_codes():
@@ -53,3 +59,9 @@ def test_a_wrong_code_ends_the_chain():
 def test_poor_links_lead_nowhere():
     """Oracle: by hand."""
     np.testing.assert_array_equal(placed(quality=0.3).placed, np.arange(7) < QUAD)
+
+
+def test_all_that_are_placed_are_counted():
+    """Oracle: by hand; more nodes than were found cannot be identified."""
+    assert decoded().nodes == 7
+    assert decoded(misread=4).nodes == QUAD + 1

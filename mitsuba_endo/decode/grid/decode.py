@@ -50,6 +50,11 @@ class DecodedGrid:
         return np.where(self.confidence > 0, (SURE / doubt) ** (2 / 3), 0).astype(np.float32)
 
     @property
+    def nodes(self) -> int:
+        """Number of nodes of the grid: all that closed quads join, or that were identified."""
+        return int(((self.graph.component >= 0) | self.identity.placed).sum())
+
+    @property
     def coverage(self) -> float:
         """Share of the pixels that have a coordinate."""
         return float(np.isfinite(self.q[..., 0]).mean())
