@@ -92,7 +92,8 @@ def convergence_figure(trace: list[TraceRow]) -> Figure:
     axes[-1].set_xlabel("iteration")
     if trace:
         last = trace[-1]
-        axes[0].set_title(f"{last.iteration} iterations, {last.seconds:.1f} s")
+        count = f"{last.iteration} iteration{'' if last.iteration == 1 else 's'}"
+        axes[0].set_title(f"{count}, {last.seconds:.1f} s")
     return figure
 
 

@@ -104,6 +104,7 @@ def residual_histogram(
             axes.axvline(x, color="0.5", lw=0.9, ls=":", label=label if x > 0 else None)
     axes.set(xlabel=f"observed - rendered, {PX}", ylabel="density, 1/px", title="Residuals")
     axes.set_xlim(-limit, limit)
+    axes.locator_params(axis="x", nbins=5)  # small residuals have long labels
     axes.set_ylim(0, 1.3 * axes.get_ylim()[1])  # room for the legend
     axes.legend(fontsize="x-small", loc="upper right")
 
