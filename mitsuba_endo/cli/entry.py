@@ -2,7 +2,6 @@
 
 import signal
 import sys
-import threading
 from types import FrameType
 
 EXIT_INTERRUPTED = 130
@@ -14,9 +13,7 @@ LOADER = "<frozen importlib._bootstrap>"
 
 def main() -> None:
     """Run the command line."""
-    # Where Ctrl-C is ignored, as in a background job of a script, it stays ignored.
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, interrupt_after_loading)
+    _see_to_interrupts()
     try:
         from .main import app
 
@@ -24,6 +21,16 @@ def main() -> None:
     except KeyboardInterrupt:
         print(f"error: {INTERRUPTED}", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
+
+
+def _see_to_interrupts() -> None:
+    # Where Ctrl-C is ignored, as in a background job of a script, it stays ignored. Windows has no
+    # alarm by which to try again.
+    taken = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    if taken or not hasattr(signal, "setitimer"):
+        return
+    signal.signal(signal.SIGINT, interrupt_after_loading)
+    signal.signal(signal.SIGALRM, interrupt_after_loading)
 
 
 def interrupt_after_loading(number: int, frame: FrameType | None) -> None:
@@ -34,17 +41,7 @@ def interrupt_after_loading(number: int, frame: FrameType | None) -> None:
     """
     while frame is not None:
         if frame.f_code.co_filename == LOADER:
-            later = threading.Timer(RETRY, _interrupt_main_thread)
-            later.daemon = True
-            later.start()
+            signal.setitimer(signal.ITIMER_REAL, RETRY)
             return
         frame = frame.f_back
     raise KeyboardInterrupt
-
-
-def _interrupt_main_thread() -> None:
-    main_thread = threading.main_thread().ident
-    if main_thread is not None and hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(main_thread, signal.SIGINT)  # wakes it from sleep, too
-    else:
-        signal.raise_signal(signal.SIGINT)
