@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..show.numbers import INTERVAL
+from ..records.solution import INTERVAL
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -64,8 +64,7 @@ def solution_table(solution: "Solution") -> "Table":
 
 def _estimate_rows(table: "Table", name: str, estimate: "Estimate", unit: str) -> None:
     if not isinstance(estimate.value, list):
-        std = estimate.std if isinstance(estimate.std, float) else None
-        table.add_row(name, numbers(estimate.value), _half(std), unit, estimate.status)
+        table.add_row(name, numbers(estimate.value), _half(estimate.std), unit, estimate.status)
         return
     stds = estimate.std if isinstance(estimate.std, list) else [None] * len(estimate.value)
     parts = "xy" if name == "centre" else [str(i + 1) for i in range(len(estimate.value))]
@@ -95,9 +94,9 @@ def _rotation_degrees(R: np.ndarray) -> list[float]:
     return np.degrees(Rotation.from_matrix(R).as_rotvec()).tolist()
 
 
-def _half(std: float | None) -> str:
-    """Format half of a 95 % interval."""
-    return numbers(None if std is None else INTERVAL * std, 2)
+def _half(std: float | list[float] | None) -> str:
+    """Format half of a number's 95 % interval."""
+    return numbers(INTERVAL * std if isinstance(std, float) else None, 2)
 
 
 def numbers(value: float | list[float] | None, digits: int = 6) -> str:
@@ -125,9 +124,8 @@ def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     )
     focal, true_focal = solution.projector.focal, truth.projector.focal
     table.add_row(
-        "focal length", numbers(focal.value),
-        _half(focal.std if isinstance(focal.std, float) else None),
-        numbers(true_focal.value), "pattern px",
+        "focal length", numbers(focal.value), _half(focal.std), numbers(true_focal.value),
+        "pattern px",
     )  # fmt: skip
     estimate = solution.frames[0].projector_from_camera
     found, true = (s.frames[0].projector_from_camera.to_transform() for s in (solution, truth))

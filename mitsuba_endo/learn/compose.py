@@ -26,8 +26,7 @@ from .views import (
 VISIBLE = 0.01
 """Share of full scale that a line must reach for its pixel to count as lit."""
 HARSH = 0.4
-"""Share of images underexposed and full of speckle: what is decoded of dark folds is learned there,
-and few images are both by chance."""
+"""Share of images underexposed and full of speckle: few are both by chance."""
 NEAR_NODE = 0.3
 """Periods, per axis, within which the node's code is asked for."""
 

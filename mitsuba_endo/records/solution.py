@@ -13,6 +13,8 @@ from ..geometry.transforms import RigidTransform
 from .rig import Camera, Matrix3, Vector3
 from .validation import Record, read_json, validate
 
+INTERVAL = 1.96
+"""Standard deviations on each side of a 95 % interval."""
 SCHEMA = 1
 
 

@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..records.solution import Estimate, Frame, PoseEstimate, Solution
-
-INTERVAL = 1.96
-"""Standard deviations on each side of a 95 % interval."""
+from ..records.solution import INTERVAL, Estimate, Frame, PoseEstimate, Solution
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,6 @@
 """The verdict: what was measured and what was not, in sentences."""
 
-from ...records.solution import Alternative, Estimate, PoseEstimate, Solution
-
-_INTERVAL = 1.96
-"""Standard deviations on each side of a 95 % interval."""
+from ...records.solution import INTERVAL, Alternative, Estimate, PoseEstimate, Solution
 
 
 def verdict(solution: Solution) -> list[str]:
@@ -63,7 +60,7 @@ def _estimate(name: str, estimate: Estimate, unit: str) -> str:
     values = estimate.value if isinstance(estimate.value, list) else [estimate.value]
     stds = estimate.std if isinstance(estimate.std, list) else [estimate.std]
     text = ", ".join(
-        f"{v:.6g} ± {_INTERVAL * s:.2g}{unit}" for v, s in zip(values, stds, strict=True)
+        f"{v:.6g} ± {INTERVAL * s:.2g}{unit}" for v, s in zip(values, stds, strict=True)
     )
     weak = f"; only weakly determined, {estimate.reason}" if estimate.status == "weak" else ""
     return f"{name}: {text} (95 %){weak}."
@@ -74,8 +71,8 @@ def _pose(name: str, pose: PoseEstimate, unit: str) -> list[str]:
         return [f"{name}: given and not estimated."]
     if pose.R is None or pose.t is None or pose.std is None:
         return [f"{name}: not determined; {pose.reason}."]
-    angle = _INTERVAL * max(pose.std[:3]) * 57.29577951308232
-    length = _INTERVAL * max(pose.std[3:])
+    angle = INTERVAL * max(pose.std[:3]) * 57.29577951308232
+    length = INTERVAL * max(pose.std[3:])
     t = ", ".join(f"{x:.4g}" for x in pose.t)
     weak = f"; only weakly determined, {pose.reason}" if pose.status == "weak" else ""
     return [
