@@ -1,20 +1,26 @@
 """Writing that is never seen half done: write aside, then rename. What damaged files raise."""
 
 import contextlib
+import errno
 import os
-import shutil
-import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import InputError
+from .folder_mark import Kind, read_mark, remove_marked, write_mark
+from .litter import aside_of, remove
+from .outputs import check_folder, check_name
 
 DAMAGED_NPZ = (
     KeyError, IndexError, ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 """What reading an npz file raises that is cut off or holds other arrays than expected."""
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+"""Errors that another name does not mend."""
+_TRIES = 20
+"""Of putting a folder in its place while others do the same."""
 
 
 @contextlib.contextmanager
@@ -27,99 +33,101 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         InputError: the folder cannot be written.
     """
     path = Path(path)
+    check_name(path)
     _make_parent(path)
-    # Plain open() under the user's umask: mkstemp would leave the file readable by its owner only.
-    aside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    aside = aside_of(path, "partial")
     try:
-        # Not every writer (OpenEXR) reports a folder it may not write to as an OSError.
+        # Plain open() under the user's umask: mkstemp would leave the file readable by its owner
+        # only. Not every writer (OpenEXR) reports a folder it may not write to as an OSError.
         aside.touch()
         yield aside
         os.replace(aside, path)
     except OSError as error:
-        raise _not_writable(path, error) from error
+        raise not_writable(path, error) from error
     finally:
-        aside.unlink(missing_ok=True)
+        remove(aside)
 
 
 @contextlib.contextmanager
-def atomic_folder(path: str | Path) -> Iterator[Path]:
+def atomic_folder(path: str | Path, kind: Kind) -> Iterator[Path]:
     """Yield a temporary folder that becomes ``path`` if the block ends well.
 
     An existing folder is replaced as a whole at the end, so that ``path`` is absent, the old
     result, or the complete new one, and never a mixture; an existing file is refused.
 
+    Args:
+        path: the folder.
+        kind: what is written there. Its mark says so and lists the files, and only a folder of
+            this kind that holds nothing else is ever replaced.
+
     Raises:
-        InputError: ``path`` is a file, a folder that holds foreign files, or cannot be written.
+        InputError: ``path`` is a file, a folder of another kind or with foreign files, or cannot
+            be written.
     """
     path = Path(path).absolute()
-    check_output_folder(path)
+    check_folder(path, kind)
     _make_parent(path)
+    aside = aside_of(path, "partial")
     try:
-        aside = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent))
+        aside.mkdir()
     except OSError as error:
-        raise _not_writable(path, error) from error
+        raise not_writable(path, error) from error
     try:
         yield aside
-        umask = os.umask(0)
-        os.umask(umask)
-        aside.chmod(0o777 & ~umask)
-        (aside / _MARK).touch()
-        _swap(aside, path)
+        write_mark(aside, kind)
+        _swap(aside, path, kind)
     except OSError as error:
-        raise _not_writable(path, error) from error
+        raise not_writable(path, error) from error
     finally:
-        shutil.rmtree(aside, ignore_errors=True)
+        remove(aside)
 
 
-_MARK = ".mitsuba-endo"
-
-
-def check_output_folder(path: str | Path) -> None:
-    """Refuse, before any work is done, a folder that could not be replaced at the end.
-
-    Raises:
-        InputError: ``path`` is a file, holds files that this program did not write, or its
-            parent cannot be written.
-    """
-    path = Path(path)
-    if path.is_symlink() or (path.exists() and not path.is_dir()):
-        raise InputError("exists and is not a folder", str(path), "choose another output folder")
-    if path.is_dir() and any(path.iterdir()) and not (path / _MARK).exists():
-        raise InputError(
-            "holds files that mitsuba-endo did not write", str(path), "choose an empty folder"
-        )
-    parent = next(p for p in path.absolute().parents if p.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(
-            "the folder cannot be written", str(path), "choose a folder you may write to"
-        )
-
-
-def _swap(aside: Path, path: Path) -> None:
+def _swap(aside: Path, path: Path, kind: Kind) -> None:
     """Rename ``aside`` to ``path``, moving an older result out of the way first."""
+    for left in reversed(range(_TRIES)):
+        try:
+            _replace_folder(aside, path, kind)
+        except OSError as error:
+            # Another process has put its own there, or taken it away, between two calls.
+            raced = error.errno in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOENT)
+            if not raced or not left or not aside.exists():
+                raise
+        else:
+            return
+
+
+def _replace_folder(aside: Path, path: Path, kind: Kind) -> None:
     if not path.exists():
         os.replace(aside, path)
         return
-    old = path.with_name(f".{path.name}.{os.getpid()}.old")
+    check_folder(path, kind)  # once more: files may have come since the work began
+    mark = read_mark(path)
+    old = aside_of(path, "old")
     os.replace(path, old)
     try:
         os.replace(aside, path)
     except BaseException:  # Ctrl-C between the two renames must not lose the older result
         if not path.exists():
             os.replace(old, path)
+        elif mark:
+            remove_marked(old, mark)
         raise
-    shutil.rmtree(old, ignore_errors=True)
+    if mark:
+        remove_marked(old, mark)
+    else:  # it was empty
+        old.rmdir()
 
 
 def _make_parent(path: Path) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _not_writable(path, error) from error
+        raise not_writable(path, error) from error
 
 
-def _not_writable(path: Path, error: OSError) -> InputError:
-    reason = error.strerror or str(error)
-    return InputError(
-        f"cannot be written ({reason.lower()})", str(path), "choose a folder you may write to"
-    )
+def not_writable(path: str | Path, error: OSError) -> InputError:
+    """Return the sentence for what the system says of writing a file or folder."""
+    reason = (error.strerror or str(error)).lower()
+    full = "make room or choose a folder on another disk"
+    todo = full if error.errno in FULL else "choose a folder you may write to"
+    return InputError(f"cannot be written ({reason})", str(path), todo)

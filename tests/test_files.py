@@ -7,7 +7,9 @@ import pytest
 
 from mitsuba_endo import files
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.files import atomic_folder, atomic_path, check_output_folder
+from mitsuba_endo.files import atomic_folder, atomic_path
+from mitsuba_endo.folder_mark import Kind
+from mitsuba_endo.outputs import check_folder
 
 INTERRUPTIONS = [ValueError, KeyboardInterrupt, SystemExit]
 
@@ -17,7 +19,7 @@ def _everything(folder: Path) -> set[str]:
 
 
 def _write_folder(path: Path, text: str) -> None:
-    with atomic_folder(path) as aside:
+    with atomic_folder(path, Kind.MAPS) as aside:
         (aside / "value.txt").write_text(text)
 
 
@@ -72,7 +74,7 @@ def test_folder_follows_the_umask(tmp_path: Path):
 
 def test_own_folder_is_replaced_as_a_whole(tmp_path: Path):
     """Oracle: only the second run's files are left."""
-    with atomic_folder(tmp_path / "out") as aside:
+    with atomic_folder(tmp_path / "out", Kind.MAPS) as aside:
         (aside / "stale.txt").touch()
     _write_folder(tmp_path / "out", "2")
     assert _everything(tmp_path) == {"out", "out/value.txt", "out/.mitsuba-endo"}
@@ -88,7 +90,7 @@ def test_interrupted_folder_keeps_what_was_there(
     if existing:
         _write_folder(out, "old")
     expected = _everything(tmp_path)
-    with pytest.raises(interruption), atomic_folder(out) as aside:
+    with pytest.raises(interruption), atomic_folder(out, Kind.MAPS) as aside:
         _write_half(aside / "value.txt", interruption)
     assert _everything(tmp_path) == expected
     assert not existing or (out / "value.txt").read_text() == "old"
@@ -151,7 +153,7 @@ def test_not_a_folder_is_refused(tmp_path: Path, kind: str):
         (tmp_path / "target").mkdir()
         out.symlink_to(tmp_path / "target")
     with pytest.raises(InputError, match=r"out: exists and is not a folder"):
-        check_output_folder(out)
+        check_folder(out, Kind.MAPS)
     assert out.is_symlink() or out.read_text() == "x"
 
 
@@ -159,7 +161,7 @@ def test_parent_that_is_a_file_is_refused(tmp_path: Path):
     """Oracle: a sentence that names the path, for folders and for files alike."""
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match="cannot be written"):
-        check_output_folder(tmp_path / "file" / "out")
+        check_folder(tmp_path / "file" / "out", Kind.MAPS)
     with pytest.raises(InputError, match="cannot be written"):
         _write_folder(tmp_path / "file" / "out", "1")
     with pytest.raises(InputError, match="cannot be written"), atomic_path(tmp_path / "file" / "a"):
@@ -171,7 +173,7 @@ def test_folder_without_permission_is_refused(tmp_path: Path, monkeypatch: pytes
     """Oracle: a sentence instead of work. Root may write anywhere, so the answer is replaced."""
     monkeypatch.setattr(files.os, "access", lambda path, mode: False)
     with pytest.raises(InputError, match="choose a folder you may write to"):
-        check_output_folder(tmp_path / "out")
+        check_folder(tmp_path / "out", Kind.MAPS)
 
 
 def test_block_is_not_entered_when_the_file_cannot_be_made(tmp_path: Path):

@@ -1,6 +1,5 @@
 """``mitsuba-endo calibrate``: from correspondence maps to a solution folder."""
 
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -79,21 +78,26 @@ def calibrate(
     Images of the coded grid are decoded first, as by the command decode; their maps and pictures
     of the grids found go into the folder "decoded" of the solution.
     """
-    with session(quiet, as_json, debug) as output, tempfile.TemporaryDirectory() as aside:
-        from ..files import check_output_folder
+    from ..litter import scratch_folder
+
+    with session(quiet, as_json, debug) as output, scratch_folder() as aside:
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
         from ..records.checkpoint import load_checkpoint
         from ..solve.options import Options
-        from .decode import decode_images, keep_decoded
+        from .decode import decode_images
 
-        check_output_folder(out)
+        prepare_folder(out, Kind.CALIBRATION, [*maps, rig, *([resume] if resume else [])])
         checkpoint = None if resume is None else load_checkpoint(resume)
-        paths = decode_images(maps, rig, pattern, Path(aside), output)
+        paths = decode_images(maps, rig, pattern, aside, output)
+        decoded = aside if any(aside.iterdir()) else None
         frames, rig_record = load_input(paths, rig, share)
         options = Options(solver=solver, start=start, seed=seed)
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
-            solution = solve_and_write(frames, rig_record, options, out, output, checkpoint, show)
-            keep_decoded(Path(aside), out)
+            solution = solve_and_write(
+                frames, rig_record, options, out, output, checkpoint, show, decoded
+            )
             report(solution, out, output)
             if watch:
                 watch.end(solution, output)
@@ -161,6 +165,7 @@ def solve_and_write(
     output: Session,
     resume: "Checkpoint | None" = None,
     observe: "Observe | None" = None,
+    decoded: Path | None = None,
 ) -> "Solution":
     """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
@@ -172,7 +177,7 @@ def solve_and_write(
 
         result = solve(maps, rig, options, advance, resume, observe)
         advance(0.95, "Drawing pictures")
-        return write_solution_folder(out, result, rig)
+        return write_solution_folder(out, result, rig, decoded)
 
 
 def exit_code(solution: "Solution") -> int:

@@ -1,6 +1,5 @@
 """``mitsuba-endo decode``: from images of the coded grid to correspondence maps."""
 
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,12 +69,14 @@ def decode(
     grid found. An image without this pattern gets no map; if that is every one, the exit code is 3.
     """
     with session(quiet, as_json, debug) as output:
-        from ..files import atomic_folder, check_output_folder
+        from ..files import atomic_folder
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
         from ..records.rig import load_rig
 
-        check_output_folder(out)
+        prepare_folder(out, Kind.MAPS, [*images, rig, *([weights] if weights else [])])
         record = load_rig(rig)
-        with atomic_folder(out) as folder:
+        with atomic_folder(out, Kind.MAPS) as folder:
             found = decode_into(folder, images, record, pattern, weights, output)
             refuse_nothing(found)
         decoded = [one for one in found if not one.reason]
@@ -140,16 +141,6 @@ def decode_images(
     refuse_nothing(found)
     output.print(*(one.line() for one in found))
     return [map_path(aside, one.name) for one in found if not one.reason]
-
-
-def keep_decoded(aside: Path, solution: Path) -> None:
-    """Move what :func:`decode_images` wrote into the solution folder."""
-    from ..files import atomic_folder
-
-    if not any(aside.iterdir()):
-        return
-    with atomic_folder(solution / "decoded") as folder:
-        shutil.copytree(aside, folder, dirs_exist_ok=True)
 
 
 def refuse_nothing(found: Sequence[Summary]) -> None:

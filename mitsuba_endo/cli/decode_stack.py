@@ -59,11 +59,13 @@ def decode_stack(
     with session(quiet, as_json, debug) as output:
         from ..decode.stack import decode_stack as decode
         from ..decode.stack_files import check_names, load_stack, stack_paths
+        from ..outputs import prepare_file
         from ..records.correspondence import check_map_path, save_map
 
         check_map_path(out)
         plan = make_plan(kind, width, height, inverse, reference, stripe, periods, steps)
         paths = stack_paths(images)
+        prepare_file(out, paths)
         check_names(paths, plan)
         result = decode(load_stack(paths, gamma), plan, min_contrast=min_contrast)
         save_map(out, result.q)

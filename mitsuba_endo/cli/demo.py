@@ -41,13 +41,15 @@ def demo(
 ) -> None:
     """Render an endoscope in a stomach, calibrate it from its image, compare with the truth."""
     with session(quiet, as_json, debug) as output:
-        from ..files import atomic_folder, check_output_folder
+        from ..files import atomic_folder
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
         from ..records.solution import load_solution
         from ..solve.options import Options
 
         started = time.perf_counter()
-        check_output_folder(out)
-        with atomic_folder(out) as folder:
+        prepare_folder(out, Kind.DEMO)
+        with atomic_folder(out, Kind.DEMO) as folder:
             _make_input(folder, seed, output)
             rig_file, decoded = folder / "input" / "rig.yaml", folder / "decoded"
             decoded.mkdir()

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ..evaluate.metrics import Metrics
 
 Truth = Annotated[Path, typer.Option("--truth", help="Truth file of the synthetic scene.")]
+METRICS = "metrics.json"
 Out = Annotated[Path, typer.Option("--out", help="File to write, e.g. metrics.json.")]
 
 
@@ -25,6 +26,9 @@ def evaluate(
 ) -> None:
     """Compare a solution with the truth."""
     with session(quiet, as_json, debug) as output:
+        from ..outputs import prepare_file
+
+        prepare_file(out, [*result_files(result), *result_files(truth)], [METRICS])
         metrics = evaluate_folders(result, truth)
         metrics.save(out)
         report(metrics, output)
@@ -45,6 +49,12 @@ def evaluate_folders(result: Path, truth: Path) -> "Metrics":
 
 def _folder(path: Path) -> Path:
     return path if path.is_dir() else path.parent
+
+
+def result_files(path: Path) -> list[Path]:
+    """Return the folder of a solution or truth, and the file in it."""
+    folder = _folder(path)
+    return [folder, *(folder / name for name in ("solution.json", "truth.json")), path]
 
 
 def report(metrics: "Metrics", output: Session) -> None:

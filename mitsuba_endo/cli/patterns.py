@@ -41,7 +41,10 @@ def patterns(
     """Write the images of a Gray-code or phase-shift stack, numbered in order, to be projected."""
     with session(quiet, as_json, debug) as output:
         from ..decode.stack_files import save_patterns
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
 
+        prepare_folder(out, Kind.PATTERNS)
         plan = make_plan(kind, width, height, inverse, reference, stripe, periods, steps)
         names = save_patterns(out, plan)
         output.print(f"{out}: {len(names)} images; decode pictures of them with", _command(plan))

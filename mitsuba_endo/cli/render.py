@@ -37,11 +37,14 @@ def render(
 ) -> None:
     """Render image, projector coordinates, depth, normals, masks and exact truth of a scene."""
     with session(quiet, as_json, debug) as output:
-        from ..files import check_output_folder
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
         from ..show.capture_folder import write_capture_folder
 
-        check_output_folder(out)
-        capture, loaded = capture_scene(scene, parse_settings(parameters), spp, seed, output)
+        settings = parse_settings(parameters)
+        # A scene or a value that is no path names no file, and is passed over.
+        prepare_folder(out, Kind.CAPTURE, [scene, *settings.values()])
+        capture, loaded = capture_scene(scene, settings, spp, seed, output)
         write_capture_folder(out, capture, loaded)
         lit = float(capture.visible.mean())
         width, height = capture.image.shape[1], capture.image.shape[0]

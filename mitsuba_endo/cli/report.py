@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from .console import Debug, Json, Quiet, session
+from .evaluate import result_files
 from .options import MaybeTruth
 
 Results = Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Solution folders.")]
@@ -35,12 +36,15 @@ def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
             is not called as a page is.
     """
     from ..errors import InputError
+    from ..outputs import prepare_file
     from ..show.read_folder import read_solution_folder
-    from ..show.report import save_report
+    from ..show.report import REPORT, save_report
     from ..show.truth import find_truth
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError("a report is HTML", str(out), "give --out a name that ends in .html")
+    read = [*results, *([truth] if truth else [])]
+    prepare_file(out, [file for path in read for file in result_files(path)], [REPORT])
     calibrations = [read_solution_folder(path) for path in results]
     truths = [
         truth or find_truth(path, calibration.solution)

@@ -33,13 +33,13 @@ def write_contact_sheets(dataset: Dataset) -> list[Path]:
     per_sheet = COLUMNS * ROWS
     shown = min(len(dataset), SHEETS * per_sheet)
     chosen = np.linspace(0, len(dataset) - 1, shown).round().astype(int)
-    for old in dataset.folder.glob("contact_sheet_*.png"):
+    for old in dataset.folder.glob("contact_sheet_[0-9][0-9].png"):
         old.unlink()
     paths = []
     for start in range(0, shown, per_sheet):
         path = dataset.folder / f"contact_sheet_{start // per_sheet:02d}.png"
         samples = [dataset[int(i)] for i in chosen[start : start + per_sheet]]
-        _write_sheet(path, samples, f"{dataset.folder.name}, seed {dataset.config.seed}")
+        _write_sheet(path, samples, f"seed {dataset.config.seed}")
         paths.append(path)
     return paths
 

@@ -1,7 +1,6 @@
 """A dataset as a folder of files a sample: for people, and for the other commands."""
 
 import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import atomic_folder
+from ..folder_mark import Kind
+from ..litter import sweep
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import read_exr, save_map, write_exr
 from ..records.known_input import known_rig, save_rig
@@ -57,7 +58,7 @@ class FolderStore:
             InputError: the folder cannot be written.
         """
         arrays = contents.arrays_of(sample, radiance, surface)
-        with atomic_folder(self._path(sample.index)) as folder:
+        with atomic_folder(self._path(sample.index), Kind.SAMPLE) as folder:
             _write_image(folder / "image.png", arrays[contents.IMAGE])
             save_map(folder / MAP, sample.maps.correspondences())
             for name, (array, channels) in CHANNELS.items():
@@ -110,10 +111,7 @@ class FolderStore:
 
     def clear(self) -> None:
         """Remove what a killed process left half written."""
-        if self._folder.exists():
-            for path in self._folder.iterdir():
-                if path.name.endswith((".partial", ".old")):
-                    shutil.rmtree(path, ignore_errors=True)
+        sweep(self._folder, alone=True)
 
     def manifest(self) -> list[dict[str, Any]]:
         """Return every sample's kind and files with their checksums."""

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -12,12 +11,14 @@ from typing import Any, Protocol
 
 from ..errors import InputError
 from ..files import atomic_path
+from ..litter import sweep
 from ..records.validation import read_json
 from .config import FILE, Config
 from .digests import array_digest
 from .lock import locked
 from .stored import Store, numbered
 from .work import Job, Result
+from .workshop import clear_workshop
 
 SCHEMA = 1
 DATASET, MANIFEST, FAILED = "dataset.json", "manifest.json", "failed"
@@ -82,7 +83,7 @@ def make_dataset(
             _begin(job, out, count, began)
             return _make_and_list(job, out, count, pool, advance, retry_failed)
         finally:
-            shutil.rmtree(job.workshop(), ignore_errors=True)
+            clear_workshop(job.workshop())
 
 
 def _make_and_list(
@@ -96,8 +97,11 @@ def _make_and_list(
     """Make what is missing; the manifest lists what is there after an interruption, too."""
     store = job.store()
     store.clear()
+    sweep(out)
+    sweep(out / FAILED, alone=True)
     if retry_failed:
-        shutil.rmtree(out / FAILED, ignore_errors=True)
+        for index in numbered(out / FAILED, ".json"):
+            _failure(out, index).unlink()
     try:
         progress = _make_missing(job, store, count, pool, advance)
     except BaseException:
@@ -141,13 +145,17 @@ def _make_missing(
 def _record_failure(job: Job, result: Result) -> None:
     record = {"index": result.index, "seed": job.config.seed, "status": result.status,
               "reason": result.reason}  # fmt: skip
-    _write_json(Path(job.out) / FAILED / f"{result.index:06d}.json", record)
+    _write_json(_failure(job.out, result.index), record)
+
+
+def _failure(out: str | Path, index: int) -> Path:
+    return Path(out) / FAILED / f"{index:06d}.json"
 
 
 def failures(out: str | Path) -> list[dict[str, Any]]:
     """Return the records of failed samples."""
-    folder = Path(out) / FAILED
-    return [read_json(folder / f"{index:06d}.json") for index in sorted(numbered(folder, ".json"))]
+    indices = sorted(numbered(Path(out) / FAILED, ".json"))
+    return [read_json(_failure(out, index)) for index in indices]
 
 
 def _open_folder(out: Path) -> dict[str, Any] | None:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import atomic_path
+from ..litter import sweep
 from . import contents
 from .digests import array_digest, file_digest, text_digest
 from .sample import Sample
@@ -95,8 +96,7 @@ class ShardStore:
     def clear(self) -> None:
         """Remove what a killed process left half written, and staged copies of sealed samples."""
         for folder in (self._staging, self._shards):
-            for path in folder.glob(".*.partial*"):
-                path.unlink(missing_ok=True)
+            sweep(folder, alone=True)
         sealed = set().union(*map(self._within, self._numbers()))
         for index in numbered(self._staging, SUFFIX) & sealed:
             self._staged(index).unlink()

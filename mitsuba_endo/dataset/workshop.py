@@ -3,6 +3,7 @@
 Each is made once for a dataset, by whichever process needs it first, and kept in a folder.
 """
 
+import contextlib
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..decode.grid_pattern import COLOURS, CodedGrid
 from ..files import atomic_path
+from ..litter import sweep
 from ..shapes import Mesh, make_shape
 from .config import Config
 from .streams import stream
@@ -91,6 +93,16 @@ class Workshop:
 def given_path(folder: str | Path, scene: int) -> Path:
     """Return where the surface of a scene of kind ``file`` is kept."""
     return Path(folder) / f"surface{scene:03d}.npz"
+
+
+def clear_workshop(folder: Path) -> None:
+    """Remove what was kept here, and the folder unless somebody put other files into it."""
+    sweep(folder, alone=True)
+    for form in ("rabbit.npz", "pattern?????.npy", "surface???.npz"):
+        for path in folder.glob(form):
+            path.unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def save_mesh(path: Path, mesh: Mesh) -> None:

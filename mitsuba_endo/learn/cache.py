@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..files import atomic_folder
+from ..folder_mark import Kind
 from .scenes import random_kind, random_placement, random_surface
 from .views import SUPERSAMPLE, UNLIT, View, make_view
 
@@ -64,7 +65,7 @@ def open_cache(
     """
     stamp = folder / "settings.json"
     if not stamp.is_file() or json.loads(stamp.read_text())["settings"] != asdict(settings):
-        with atomic_folder(folder) as aside:
+        with atomic_folder(folder, Kind.VIEWS) as aside:
             kinds = _fill(aside, settings, tick)
             text = json.dumps({"settings": asdict(settings), "kinds": kinds}, indent=1)
             (aside / "settings.json").write_text(text)

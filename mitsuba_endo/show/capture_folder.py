@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from ..files import atomic_folder, atomic_path
+from ..folder_mark import Kind
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import save_map, write_exr
 from ..records.known_input import known_rig, save_rig
@@ -36,7 +37,7 @@ def write_capture_folder(path: str | Path, capture: Capture, loaded: LoadedScene
     Raises:
         InputError: the folder cannot be written.
     """
-    with atomic_folder(path) as folder:
+    with atomic_folder(path, Kind.CAPTURE) as folder:
         write_exr(folder / "image.exr", {c: capture.image[..., i] for i, c in enumerate("RGB")})
         _write_png(folder / "image.png", tonemap(capture.image))
         save_map(folder / MAP, capture.correspondences())

@@ -1,6 +1,7 @@
 """The folder that a calibration leaves behind."""
 
 import csv
+import shutil
 from dataclasses import astuple, fields, replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import yaml
 
 from ..files import atomic_folder, atomic_path
+from ..folder_mark import Kind
 from ..records.calibration import Calibration, TraceRow
 from ..records.checkpoint import FILE as CHECKPOINT
 from ..records.checkpoint import save_checkpoint
@@ -25,10 +27,15 @@ from .scene_file import save_scene
 from .view import SurfaceView, view_surface
 
 SCENE = "scene.xml"
+DECODED = "decoded"
+"""Maps and pictures of the grids found, where images were given."""
 
 
 def write_solution_folder(
-    path: str | Path, calibration: Calibration, rig: Rig | None = None
+    path: str | Path,
+    calibration: Calibration,
+    rig: Rig | None = None,
+    decoded: str | Path | None = None,
 ) -> Solution:
     """Write everything a calibration found, all of it or nothing.
 
@@ -47,6 +54,7 @@ def write_solution_folder(
     state.npz             from which ``calibrate --resume`` goes on
     rig.yaml              the rig with all defaults filled in, if given
     report.html           look at this first: verdict, maps, numbers, provenance; needs no network
+    decoded/              copies of the files of the folder ``decoded``, if given
     overview.png          the same at one look; the other pictures show the same at full size:
                           observed, rendered, residual, histogram, surface, convergence
     ====================  =========================================================================
@@ -57,7 +65,7 @@ def write_solution_folder(
     Raises:
         InputError: the folder holds other files or cannot be written.
     """
-    with atomic_folder(path) as folder:
+    with atomic_folder(path, Kind.CALIBRATION) as folder:
         solution = _write_scene(folder, calibration, rig)
         save_solution(folder / "solution.json", solution)
         save_surface(folder / SURFACE, calibration.surface)
@@ -80,6 +88,8 @@ def write_solution_folder(
         _save_pictures(folder, calibration, view)
         shown = replace(calibration, solution=solution)
         save_report(folder / REPORT, [(Path(path).name, shown)], [view])
+        if decoded is not None:
+            shutil.copytree(decoded, folder / DECODED)
     return solution
 
 

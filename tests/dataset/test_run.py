@@ -17,6 +17,7 @@ from mitsuba_endo.dataset.sample import make_sample
 from mitsuba_endo.dataset.work import Result, produce
 from mitsuba_endo.dataset.workshop import Workshop
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.litter import aside_of
 from tests.dataset.small import (
     SHEET,
     InThisProcess,
@@ -98,10 +99,11 @@ def test_an_interrupted_run_goes_on_where_it_was(whole, tmp_path: Path):
         make_dataset(config, out, 6, Interrupted)
     assert len(Dataset(out)) == 3
     if form == "files":
-        (out / "samples" / ".000004.x.partial").mkdir()
-        (out / "samples" / ".000004.x.partial" / "image.png").write_bytes(b"half")
+        half = aside_of(out / "samples" / "000004", "partial")
+        half.mkdir()
+        (half / "image.png").write_bytes(b"half")
     else:
-        (out / "staging" / ".000004.99.partial.h5").write_bytes(b"half")
+        aside_of(out / "staging" / "000004.h5", "partial").write_bytes(b"half")
     made = []
 
     def noted(job, index):

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...files import atomic_folder
+from ...folder_mark import Kind
 from ...geometry.cameras import CameraModel
 from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
@@ -25,7 +26,9 @@ _PIXEL_CENTRE = 0.5
 _FULL_OPENCV, _FISHEYE = 8, 4
 
 
-@register_exporter("colmap", "folder with a sparse model in text form; pinhole projectors only")
+@register_exporter(
+    "colmap", "folder with a sparse model in text form; pinhole projectors only", Kind.COLMAP
+)
 def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
     """Write cameras.txt, images.txt and points3D.txt.
 
@@ -47,7 +50,7 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
         raise InputError("surface is missing", "solution.json", "calibrate again")
     points, seen = _points(solution, folder)
     cameras, images = _cameras(solution), _images(solution, seen)
-    with atomic_folder(path) as aside:
+    with atomic_folder(path, Kind.COLMAP) as aside:
         _write(aside / "cameras.txt", cameras)
         _write(aside / "images.txt", images)
         _write(aside / "points3D.txt", _point_lines(points, seen))

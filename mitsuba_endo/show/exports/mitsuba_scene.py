@@ -6,6 +6,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...files import atomic_folder
+from ...folder_mark import Kind
 from ...records.solution import Solution
 from ...records.surface import load_surface, save_surface
 from ..scene_file import save_scene
@@ -13,7 +14,7 @@ from .known import known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
 
 
-@register_exporter("mitsuba", "folder with scene.xml and surface.ply")
+@register_exporter("mitsuba", "folder with scene.xml and surface.ply", Kind.SCENE)
 def write_mitsuba(solution: Solution, folder: Path, path: Path) -> None:
     """Write the scene of the first frame with the surface beside it.
 
@@ -27,6 +28,6 @@ def write_mitsuba(solution: Solution, folder: Path, path: Path) -> None:
     projector, size = known_projector(solution, first), known_size(solution)
     surface = load_surface(folder / solution.surface)
     distance = float(np.median(np.linalg.norm(surface.vertices, axis=-1)))
-    with atomic_folder(path) as aside:
+    with atomic_folder(path, Kind.SCENE) as aside:
         save_surface(aside / "surface.ply", surface)
         save_scene(aside / "scene.xml", camera, projector, size, pose, "surface.ply", distance)

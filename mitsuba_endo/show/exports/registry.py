@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import InputError
+from ...folder_mark import Kind
+from ...outputs import prepare_file, prepare_folder
 from ...records.solution import Solution, load_solution
 
 Write = Callable[[Solution, Path, Path], None]
@@ -19,16 +21,18 @@ class Exporter:
     about: str
     """What is written, in a few words."""
     write: Write
+    kind: Kind | None
+    """Of the folder written; None where a file is."""
 
 
 EXPORTERS: dict[str, Exporter] = {}
 
 
-def register_exporter(name: str, about: str) -> Callable[[Write], Write]:
+def register_exporter(name: str, about: str, kind: Kind | None = None) -> Callable[[Write], Write]:
     """Decorator that makes a function available as a format."""
 
     def register(write: Write) -> Write:
-        EXPORTERS[name] = Exporter(name, about, write)
+        EXPORTERS[name] = Exporter(name, about, write, kind)
         return write
 
     return register
@@ -48,6 +52,10 @@ def export(result: str | Path, name: str, out: str | Path) -> None:
     """
     if name not in EXPORTERS:
         raise InputError(f"unknown format '{name}'", "--format", f"give {', '.join(EXPORTERS)}")
-    result = Path(result)
-    solution = load_solution(result)
-    EXPORTERS[name].write(solution, result if result.is_dir() else result.parent, Path(out))
+    result, out, exporter = Path(result), Path(out), EXPORTERS[name]
+    folder = result if result.is_dir() else result.parent
+    if exporter.kind is None:
+        prepare_file(out, [folder, result, folder / "solution.json"])
+    else:
+        prepare_folder(out, exporter.kind, [result])
+    exporter.write(load_solution(result), folder, out)
