@@ -15,7 +15,9 @@ MaybeTruth = Annotated[
     ),
 ]
 Port = Annotated[int, typer.Option(min=0, max=65535, help="First port to try.")]
-Host = Annotated[str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines.")]
+Host = Annotated[
+    str, typer.Option(help="Address to listen at; 0.0.0.0 for other machines, with a token.")
+]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")]
 
 PORT, HOST = 8080, "localhost"

@@ -20,6 +20,7 @@ from mitsuba_endo.show.content import Content
 from mitsuba_endo.show.read_folder import read_solution_folder
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.viewer import LiveView, Viewer, address, open_viewer, running_server
+from mitsuba_endo.show.viewer.nodes import said
 from scripts.benchmarks.chromium import EXECUTABLE, browser
 from tests.show.test_truth import write_truth
 
@@ -185,7 +186,7 @@ def test_live_view_shows_every_iteration(server: Any, calibration: Calibration):
     np.testing.assert_array_equal(live._chart.data[1], [1.0, 0.5])
     np.testing.assert_array_equal(live._chart.data[2], [2.0, 1.0])
     live.end("converged")
-    assert live._state.content == "**converged**"
+    assert live._state.content == said("converged", bold=True)
     live.show(calibration.history[0])
     assert len(live.history) == 1
 

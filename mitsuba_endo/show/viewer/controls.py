@@ -10,7 +10,7 @@ from ..content import Content
 from ..numbers import headline
 from .choice import Choice
 from .cost_chart import add_cost_chart, chart_data
-from .nodes import small
+from .nodes import listed, said, small
 from .picking import Picker
 from .stage import Stage
 
@@ -63,12 +63,14 @@ class Controls:
     def _say_result(self) -> None:
         solution = self.content.calibration.solution
         outcome, *facts = headline(solution).split("; ")
-        lines = [f"**{outcome}**", *facts]
-        self.server.gui.add_markdown("  \n".join(line.replace("_", " ") for line in lines))
+        gui = self.server.gui
+        gui.add_html(said(outcome.replace("_", " "), bold=True))
+        gui.add_html(said(*(fact.replace("_", " ") for fact in facts)))
         if solution.verdict or solution.warnings:
-            with self.server.gui.add_folder("Verdict", expand_by_default=False):
-                said = [*solution.verdict, *(f"Warning: {w}" for w in solution.warnings)]
-                self.server.gui.add_markdown("\n".join(f"- {s}" for s in said))
+            with gui.add_folder("Verdict", expand_by_default=False):
+                gui.add_html(
+                    listed([*solution.verdict, *(f"Warning: {w}" for w in solution.warnings)])
+                )
 
     def _add_show(self) -> None:
         gui, content = self.server.gui, self.content
@@ -134,7 +136,7 @@ class Controls:
         gui = self.server.gui
         with gui.add_folder("Measure"):
             box = gui.add_checkbox("pick points", False)
-            self._told = gui.add_markdown(self.picker.words)
+            self._told = gui.add_html(said(self.picker.words))
             clear = gui.add_button("Clear")
 
         box.on_update(lambda _: self.pick(box.value))
@@ -160,12 +162,12 @@ class Controls:
                 self.picker.add(origin, direction, surfaces)
             else:
                 self.picker.words = "Show the result's surface first."
-            self._told.content = self.picker.words
+            self._told.content = said(self.picker.words)
 
     def _clear(self) -> None:
         with self._lock:
             self.picker.clear()
-            self._told.content = self.picker.words
+            self._told.content = said(self.picker.words)
 
     def _legend_text(self) -> str:
         quantities = self.content.quantities()

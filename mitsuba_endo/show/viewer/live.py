@@ -11,7 +11,7 @@ from ..colours import CAMERA, PROJECTOR
 from ..places import REACH, camera_corners, pattern_corners, pyramid
 from .controls import snapshot_words
 from .cost_chart import add_cost_chart, chart_data
-from .nodes import Nodes, small
+from .nodes import Nodes, said, small
 from .stage import light, look_from, put_snapshot_surface, snapshot_place
 
 
@@ -23,7 +23,7 @@ class LiveView:
         self.nodes = Nodes(server)
         self.history: list[Snapshot] = []
         light(server)
-        self._state = server.gui.add_markdown("**Searching for a start**")
+        self._state = server.gui.add_html(said("Searching for a start", bold=True))
         self._told = server.gui.add_html(small("Lengths are multiples of the first baseline."))
         server.gui.add_html(small("Blue: camera; orange: projector."))
         self._chart: Any = None
@@ -40,7 +40,7 @@ class LiveView:
                 put_snapshot_surface(self.nodes, snapshot, s)
             for k in range(len(snapshot.world_from_camera)):
                 self._frusta(snapshot, k)
-        self._state.content = "**Optimising**"
+        self._state.content = said("Optimising", bold=True)
         self._told.content = small(snapshot_words(snapshot))
         if self._chart is None:
             self._chart = add_cost_chart(self.server, self.history)
@@ -48,7 +48,7 @@ class LiveView:
 
     def end(self, words: str) -> None:
         """Say how the optimisation ended."""
-        self._state.content = f"**{words}**"
+        self._state.content = said(words, bold=True)
 
     def _frusta(self, snapshot: Snapshot, frame: int) -> None:
         place, projector = snapshot_place(snapshot, frame), self._rig.projector

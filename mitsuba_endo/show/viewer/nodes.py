@@ -1,7 +1,7 @@
 """Nodes of viser's scene that stay while nothing about them changes."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -60,6 +60,22 @@ def rgb_bytes(colour: str) -> tuple[int, int, int]:
     """Return a matplotlib colour as 0 to 255."""
     r, g, b = (round(255 * c) for c in to_rgb(colour))
     return r, g, b
+
+
+def said(*lines: str, bold: bool = False) -> str:
+    """Return lines of text as HTML of the panel.
+
+    Never Markdown: viser runs what it finds in that, and names of files are in what is said.
+    """
+    weight = "font-weight:bold;" if bold else ""
+    text = "<br>".join(escape(line) for line in lines)
+    return f'<div style="padding:0 14px 6px;{weight}overflow-wrap:anywhere">{text}</div>'
+
+
+def listed(lines: Sequence[str]) -> str:
+    """Return lines of text as an HTML list of the panel."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f'<ul style="margin:0;padding:0 14px 6px 28px;overflow-wrap:anywhere">{items}</ul>'
 
 
 def small(text: str) -> str:

@@ -89,4 +89,4 @@ class Picker:
                 font_screen_scale=1.2,
             )
         )  # fmt: skip
-        return f"**{words}**"
+        return words

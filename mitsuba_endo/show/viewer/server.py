@@ -13,15 +13,21 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from ...errors import InputError
+from .guard import QUERY, Guard, guarding, without_sharing
 
 TITLE = "mitsuba-endo"
 _TAKEN = (errno.EADDRINUSE, errno.EACCES)
 _LAST_PORT = 65535
+_TOKEN = "mitsuba_endo_token"
+"""Attribute of a server: what :func:`address` adds."""
 
 
 @contextlib.contextmanager
 def running_server(host: str, port: int) -> Iterator[Any]:
     """Start viser on ``host`` and the first free port from ``port`` on, and stop it at the end.
+
+    It answers its own page only (see :mod:`.guard`), and beyond this machine who knows its address
+    with the token in it.
 
     Raises:
         InputError: viser is not installed, or the address cannot be used.
@@ -34,9 +40,11 @@ def running_server(host: str, port: int) -> Iterator[Any]:
         ) from None
     # A browser that leaves while it connects is no fault to show a traceback for.
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    port = _free_port(host, port)
-    with _silent():
+    port, guard = _free_port(host, port), Guard(host)
+    with _silent(), guarding(guard):
         server = viser.ViserServer(host=host, port=port, label=TITLE, verbose=False)
+    without_sharing(server)
+    setattr(server, _TOKEN, guard.token)
     server.gui.configure_theme(
         control_layout="collapsible", control_width="large", show_logo=False,
         show_share_button=False, brand_color=(0, 114, 178),
@@ -84,10 +92,12 @@ async def _first_listening(host: str, port: int) -> int:
 
 
 def address(server: Any) -> str:
-    """Return what to type into a browser."""
+    """Return what to type into a browser, with the token where the server asks for one."""
     host = server.get_host()
     host = "localhost" if host in ("0.0.0.0", "::") else host
-    return f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+    plain = f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+    token = getattr(server, _TOKEN, None)
+    return f"{plain}/?{QUERY}={token}" if token else plain
 
 
 def wait_for_interrupt() -> None:
