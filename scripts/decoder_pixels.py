@@ -12,7 +12,7 @@ import typer
 from numpy.typing import NDArray
 
 from mitsuba_endo import backend
-from mitsuba_endo.decode.grid.network import load_network
+from mitsuba_endo.decode.network import load_network
 from mitsuba_endo.learn.compose import NEAR_NODE, Truth
 from mitsuba_endo.learn.metrics import pixel_metrics
 from mitsuba_endo.learn.views import MIXED, largest_step

@@ -54,7 +54,8 @@ def main(
     seen = open_cache(out / "views", CacheSettings(views=views, seed=seed), tick)
     network = train(plan, seen, held_out, out, typer.echo)
     if ship:
-        shutil.copyfile(network, SHIPPED)
+        for suffix in (".onnx", ".json"):
+            shutil.copyfile(network.with_suffix(suffix), SHIPPED.with_suffix(suffix))
 
 
 if __name__ == "__main__":

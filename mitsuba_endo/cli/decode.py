@@ -11,7 +11,7 @@ from .console import EXIT_FAULT, Debug, Json, Quiet, Session, session
 
 if TYPE_CHECKING:
     from ..decode.grid.decode import DecodedGrid
-    from ..decode.image_files import Frame
+    from ..decode.image_files import ImageFrame
     from ..records.rig import Rig
 
 Images = Annotated[
@@ -100,8 +100,8 @@ def decode_into(
             network.
     """
     from ..decode.grid.decode import decode_image
-    from ..decode.grid.network import load_network
     from ..decode.image_files import read_frames
+    from ..decode.network import load_network
     from ..decode.pattern_option import coded_grid
 
     grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
@@ -111,7 +111,7 @@ def decode_into(
         for frame in _sized(read_frames(images), rig):
             advance(0.0, f"Decoding {frame.name}")
             result = decode_image(frame.image, network, grid)
-            placed, coverage = int(result.identity.placed.sum()), result.coverage
+            placed, coverage = int(result.assignment.assigned.sum()), result.coverage
             found.append(Summary(frame.name, result.nodes, placed, coverage, result.reason))
             _write(folder, frame, result)
     return found
@@ -162,7 +162,7 @@ def map_path(folder: Path, frame: str) -> Path:
     return folder / f"{frame}.exr"
 
 
-def _sized(frames: "Iterator[Frame]", rig: "Rig") -> "Iterator[Frame]":
+def _sized(frames: "Iterator[ImageFrame]", rig: "Rig") -> "Iterator[ImageFrame]":
     from ..errors import InputError
 
     for frame in frames:
@@ -176,7 +176,7 @@ def _sized(frames: "Iterator[Frame]", rig: "Rig") -> "Iterator[Frame]":
         yield frame
 
 
-def _write(folder: Path, frame: "Frame", result: "DecodedGrid") -> None:
+def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid") -> None:
     import cv2
 
     from ..records.correspondence import WEIGHT, save_map

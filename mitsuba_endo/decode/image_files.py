@@ -18,7 +18,7 @@ DEPTHS = (8, 10, 12, 14, 16)
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class ImageFrame:
     """One image."""
 
     name: str
@@ -34,7 +34,7 @@ def is_images(path: Path) -> bool:
     return path.is_dir() or path.suffix.lower() in SUFFIXES + VIDEOS
 
 
-def read_frames(paths: Sequence[Path]) -> Iterator[Frame]:
+def read_frames(paths: Sequence[Path]) -> Iterator[ImageFrame]:
     """Yield the images of files, folders and videos, one after the other.
 
     Raises:
@@ -71,12 +71,12 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     return [(int(p), "") if p.isdigit() else (-1, p) for p in parts if p]
 
 
-def _image(path: Path) -> Iterator[Frame]:
+def _image(path: Path) -> Iterator[ImageFrame]:
     raw = read_image(path)
-    yield Frame(path.stem, str(path), (raw / full_scale(raw)).astype(np.float32))
+    yield ImageFrame(path.stem, str(path), (raw / full_scale(raw)).astype(np.float32))
 
 
-def _video(path: Path) -> Iterator[Frame]:
+def _video(path: Path) -> Iterator[ImageFrame]:
     if not path.is_file():
         raise InputError("no such video", str(path), "check the path")
     video = cv2.VideoCapture(str(path))
@@ -86,7 +86,7 @@ def _video(path: Path) -> Iterator[Frame]:
             read, raw = video.read()
             if not read:
                 break
-            yield Frame(f"{path.stem}_{found:05d}", f"{path} frame {found}",
+            yield ImageFrame(f"{path.stem}_{found:05d}", f"{path} frame {found}",
                         (np.asarray(raw) / 255).astype(np.float32))  # fmt: skip
             found += 1
     finally:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, NothingDecodedError
-from .agreement import agreeing
+from .consistency import locally_consistent
 from .gray_code import CERTAIN, bit_images, decode_bits
 from .gray_interpolation import interpolate
 from .phase_shift import phase_images, refine, unroll_coarsest, wrapped_coordinate
@@ -237,7 +237,7 @@ def _checked(
             f"no pixel changes by {100 * need:.1f} % of full scale from image to image", "stack",
             "check exposure and ambient light, or lower the required contrast",
         )  # fmt: skip
-    agree = agreeing(q, slack=max(2.0, 1.5 * plan.stripe if plan.kind == "gray" else 0.0))
+    agree = locally_consistent(q, slack=max(2.0, 1.5 * plan.stripe if plan.kind == "gray" else 0.0))
     q = np.where(agree[..., None], q, np.nan).astype(np.float32)
     usable = int((lit & ~saturated).sum())
     if usable >= FEW and agree.sum() < ALL_WRONG * usable:

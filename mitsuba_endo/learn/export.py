@@ -8,8 +8,7 @@ import onnx  # pyright: ignore[reportMissingImports]
 import torch  # pyright: ignore[reportMissingImports]
 from torch import nn  # pyright: ignore[reportMissingImports]
 
-from ..decode.grid.heads import CHANNELS
-from ..decode.grid.network import STRIDE
+from ..decode.network import STRIDE, describe
 from ..decode.normalise import INPUT_CHANNELS
 from ..files import atomic_path
 
@@ -21,11 +20,10 @@ def export_onnx(network: nn.Module, path: Path, notes: dict[str, str]) -> None:
     """Write the network as ONNX: ``image`` (1, 2, H, W) to ``heads`` (1, 9, H, W), any H and W
     that are multiples of 16.
 
-    The metadata holds the names of the output's channels, comma-separated, as ``channels``, the
-    multiple as ``stride``, and the notes.
+    Beside it, in a JSON file of the same name, lies what ``decode.network.describe`` says of it.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: a file cannot be written.
     """
     still = copy.deepcopy(network).to("cpu").float().eval()
     example = torch.zeros(1, INPUT_CHANNELS, 4 * STRIDE, 6 * STRIDE)
@@ -38,8 +36,7 @@ def export_onnx(network: nn.Module, path: Path, notes: dict[str, str]) -> None:
                 still, (example,), aside, input_names=["image"], output_names=["heads"],
                 dynamic_axes={"image": sizes, "heads": sizes}, opset_version=OPSET, dynamo=False,
             )  # fmt: skip
-        model = onnx.load(aside)
-        values = {"channels": ",".join(CHANNELS), "stride": str(STRIDE), **notes}
-        onnx.helper.set_model_props(model, values)
-        onnx.checker.check_model(model)
-        onnx.save(model, aside)
+        onnx.checker.check_model(onnx.load(aside))
+        description = describe(Path(aside).read_bytes(), notes)
+    with atomic_path(path.with_suffix(".json")) as aside:
+        Path(aside).write_text(description, "utf-8")

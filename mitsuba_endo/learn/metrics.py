@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid.heads import Heads
+from ..decode.network import Heads
 from .compose import Truth
 
 CONFIDENT = 0.5

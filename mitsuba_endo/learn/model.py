@@ -5,7 +5,7 @@ from itertools import pairwise
 import torch  # pyright: ignore[reportMissingImports]
 from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
-from ..decode.grid.heads import CHANNELS
+from ..decode.network import CHANNELS
 from ..decode.normalise import INPUT_CHANNELS
 
 
@@ -20,7 +20,7 @@ def _block(inputs: int, outputs: int) -> nn.Sequential:
 class DecoderNet(nn.Module):
     """(N, 2, H, W) to (N, 9, H, W), H and W multiples of STRIDE.
 
-    The output's channels are those of ``decode.grid.heads``: sine and cosine of the lattice
+    The output's channels are those of ``decode.network``: sine and cosine of the lattice
     coordinates' phases, then logits.
 
     The first convolution has stride 2 and a 4 x 4 kernel, so that it sees every pixel alike. At the

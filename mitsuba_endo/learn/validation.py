@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.settings import Effects
-from ..decode.grid.heads import CHANNELS, read_heads
+from ..decode.network import CHANNELS, read_heads
 from ..decode.normalise import normalise
 from .cache import ViewCache
 from .compose import Look, Truth, compose

@@ -28,22 +28,22 @@ def grid_picture(
     """
     factor = max(1, -(-WIDTH // image.shape[1]))
     canvas = _canvas(image, factor)
-    graph, identity = decoded.graph, decoded.identity
+    graph, assignment = decoded.graph, decoded.assignment
     at = np.rint((graph.nodes.at + 0.5) * factor * FINE - 0.5 * FINE).astype(int)
     links = graph.links
-    placed = identity.placed[links.start] & identity.placed[links.end]
-    fits = identity.turn * links.step == (identity.node[links.end] - identity.node[links.start])
-    placed &= fits.all(1)
+    joined = assignment.assigned[links.start] & assignment.assigned[links.end]
+    away = assignment.node[links.end] - assignment.node[links.start]
+    joined &= (assignment.turn * links.step == away).all(1)
     for k in range(len(links)):
         # A vertical link belongs to a column, a horizontal one to a row.
-        line = int(identity.node[links.start[k], 1 - links.axis[k]])
-        colour = COLOURS[line % len(COLOURS)] if placed[k] else REFUSED
+        line = int(assignment.node[links.start[k], 1 - links.axis[k]])
+        colour = COLOURS[line % len(COLOURS)] if joined[k] else REFUSED
         start, end = at[links.start[k]].tolist(), at[links.end[k]].tolist()
-        cv2.line(canvas, start, end, colour, 2 if placed[k] else 1, cv2.LINE_AA, 4)
-    for k in np.flatnonzero(~identity.placed):
+        cv2.line(canvas, start, end, colour, 2 if joined[k] else 1, cv2.LINE_AA, 4)
+    for k in np.flatnonzero(~assignment.assigned):
         cv2.circle(canvas, at[k].tolist(), 3 * FINE, REFUSED, 1, cv2.LINE_AA, 4)
-    for k in np.flatnonzero(identity.placed & (identity.node % LABELLED == 0).all(1)):
-        _label(canvas, at[k] // FINE, f"{identity.node[k, 0]},{identity.node[k, 1]}")
+    for k in np.flatnonzero(assignment.assigned & (assignment.node % LABELLED == 0).all(1)):
+        _label(canvas, at[k] // FINE, f"{assignment.node[k, 0]},{assignment.node[k, 1]}")
     if decoded.reason:
         _label(canvas, np.array([4, 24]), decoded.reason)
     return canvas

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_endo.decode.grid.decode import DecodedGrid, decode_heads
-from mitsuba_endo.decode.grid.heads import CHANNELS, read_heads
 from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decode.network import CHANNELS, read_heads
 from mitsuba_endo.errors import InputError
 from tests.decode.grid_views import HEIGHT, WIDTH, view
 from tests.decode.heads import Errors, depth_edges, network_output
@@ -50,7 +50,7 @@ def test_coordinates(llvm, shape: str, coverage: float, wrong: float, turned: bo
     assert np.quantile(error, 0.95) < 0.05
     assert (error.max(1) > 0.5).mean() <= wrong
     assert share > coverage
-    assert decoded.identity.turn == (-1 if turned else 1)
+    assert decoded.assignment.turn == (-1 if turned else 1)
 
 
 def test_what_is_not_lit_stays_unknown(llvm):
@@ -84,7 +84,7 @@ def test_misread_codes_and_holes(llvm):
     error, share = _errors(decoded, q)
     assert (error.max(1) > 0.5).mean() < 0.001
     assert share > 0.7
-    assert decoded.identity.read == pytest.approx(0.84, abs=0.05)
+    assert decoded.assignment.codes_right == pytest.approx(0.84, abs=0.05)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])

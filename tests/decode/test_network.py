@@ -1,17 +1,19 @@
 """Running the network that comes with the package, with either engine and at any size."""
 
+import hashlib
+import json
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.grid.heads import CHANNELS
-from mitsuba_endo.decode.grid.network import Network, load_network
-from mitsuba_endo.decode.grid.onnx_metadata import metadata
+from mitsuba_endo.decode.network import CHANNELS, Network, load_network
 from mitsuba_endo.errors import InputError
 from tests.decode.grid_views import photo, view
 
-WEIGHTS = (files("mitsuba_endo.decode") / "weights" / "decoder.onnx").read_bytes()
+SHIPPED = Path(str(files("mitsuba_endo.decode"))) / "weights" / "decoder.onnx"
+WEIGHTS = SHIPPED.read_bytes()
 
 
 @pytest.mark.parametrize("size", [(250, 333), (176, 240), (16, 48), (33, 7)])
@@ -38,21 +40,40 @@ def test_kinds_of_images(llvm):
         np.testing.assert_allclose(network.heads(same).confidence, expected.confidence, atol=1e-3)
 
 
-def test_the_metadata_names_the_channels():
-    """Oracle: the contract between training and decoding."""
-    assert sorted(metadata(WEIGHTS)["channels"].split(",")) == sorted(CHANNELS)
+def test_the_description_names_the_channels():
+    """Oracle: the contract between training and decoding; the file's own checksum."""
+    description = json.loads(SHIPPED.with_suffix(".json").read_text("utf-8"))
+    assert sorted(description["channels"]) == sorted(CHANNELS)
+    assert description["sha256"] == hashlib.sha256(WEIGHTS).hexdigest()
 
 
-@pytest.mark.parametrize("data", [b"", b"not a network", WEIGHTS[:1000], bytes(range(256)) * 9])
-def test_damaged_weights(data: bytes):
-    """Oracle: none of these holds the channels' names."""
-    assert metadata(data) == {}
-    with pytest.raises(InputError, match=r"some.onnx: is not a decoder network"):
-        Network(data, "some.onnx")
+def test_weights_without_description(tmp_path: Path):
+    """Oracle: the file that is missing is named; weights alone do not say what they return."""
+    (tmp_path / "own.onnx").write_bytes(WEIGHTS)
+    with pytest.raises(InputError, match=r"own.json beside it is missing"):
+        load_network(tmp_path / "own.onnx")
 
 
-def test_weights_cut_short():
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"channels": 3, "sha256": ""}', "\udcff"])
+def test_damaged_descriptions(text: str, tmp_path: Path):
+    """Oracle: none of these names channels."""
+    (tmp_path / "own.onnx").write_bytes(WEIGHTS)
+    (tmp_path / "own.json").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match=r"describes none"):
+        load_network(tmp_path / "own.onnx")
+
+
+@pytest.mark.parametrize("data", [b"", b"not a network", WEIGHTS[:1000], WEIGHTS[:-1]])
+def test_damaged_weights(data: bytes, tmp_path: Path):
+    """Oracle: the checksum is of the whole file, so no engine sees a damaged one."""
+    (tmp_path / "own.onnx").write_bytes(data)
+    (tmp_path / "own.json").write_text(SHIPPED.with_suffix(".json").read_text("utf-8"))
+    with pytest.raises(InputError, match=r"own.onnx: is not what own.json describes"):
+        load_network(tmp_path / "own.onnx")
+
+
+def test_weights_that_no_engine_reads():
     """Oracle: a file whose head is whole and whose end is missing is refused, not run."""
     broken = WEIGHTS[: len(WEIGHTS) // 2] + WEIGHTS[-400:]
     with pytest.raises(InputError):
-        Network(broken, "some.onnx")
+        Network(broken, CHANNELS, "some.onnx")

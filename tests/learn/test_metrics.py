@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("torch")
 
-from mitsuba_endo.decode.grid.heads import CHANNELS, read_heads
+from mitsuba_endo.decode.network import CHANNELS, read_heads
 from mitsuba_endo.learn.compose import Truth
 from mitsuba_endo.learn.metrics import phase_error, pixel_metrics
 

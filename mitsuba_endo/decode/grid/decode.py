@@ -2,26 +2,20 @@
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..agreement import agreeing
+from ..consistency import locally_consistent
 from ..grid_pattern import CodedGrid
+from ..network import Heads, Network
 from ..normalise import one_channel
-from .graph import GridGraph, build_graph
-from .heads import Heads, smoothed
-from .identify import Identity, identify
-from .network import Network
-from .nodes import larger
-from .unwrap import unwrap
+from .grid_graph import GridGraph, build_graph, larger
+from .node_assignment import NodeAssignment, assign_nodes
+from .phase_unwrapping import unwrap
+from .settings import MatcherSettings
 
-FEW_NODES = 9
-"""With fewer, an image shows no grid."""
-SURE = 1e-3
-"""Doubt, one less the confidence, under which coordinates are no better known."""
-DARK = 8 / 255
-"""An image whose brightest hundredth is below that is called dark."""
-SATURATED = 254.5 / 255
+DEFAULTS = MatcherSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +27,7 @@ class DecodedGrid:
     confidence: NDArray[np.float32]
     """(H, W) probability that the coordinate is right to a tenth of a period, 0 = not known."""
     graph: GridGraph
-    identity: Identity
+    assignment: NodeAssignment
     reason: str
     """Why nothing was decoded; empty if something was."""
 
@@ -46,13 +40,14 @@ class DecodedGrid:
         of up to 0.001 and of 0.003, 0.007, 0.03, 0.14 and 0.39. In heavily corrupted ones it grows
         from 0.20 to 0.61 only: there the weights differ more than they should.
         """
-        doubt = np.maximum(1 - self.confidence, SURE)
-        return np.where(self.confidence > 0, (SURE / doubt) ** (2 / 3), 0).astype(np.float32)
+        least = DEFAULTS.least_doubt
+        doubt = np.maximum(1 - self.confidence, least)
+        return np.where(self.confidence > 0, (least / doubt) ** (2 / 3), 0).astype(np.float32)
 
     @property
     def nodes(self) -> int:
-        """Number of nodes of the grid: all that closed quads join, or that were identified."""
-        return int(((self.graph.component >= 0) | self.identity.placed).sum())
+        """Number of nodes of the grid: all that closed quads join, or that were assigned."""
+        return int(((self.graph.component >= 0) | self.assignment.assigned).sum())
 
     @property
     def coverage(self) -> float:
@@ -61,7 +56,10 @@ class DecodedGrid:
 
 
 def decode_image(
-    image: NDArray[np.integer] | NDArray[np.floating], network: Network, pattern: CodedGrid
+    image: NDArray[np.integer] | NDArray[np.floating],
+    network: Network,
+    pattern: CodedGrid,
+    settings: MatcherSettings = DEFAULTS,
 ) -> DecodedGrid:
     """Decode one image (H, W) or (H, W, 3), 8 or 16 bit, or floats where 1 is full scale.
 
@@ -70,40 +68,52 @@ def decode_image(
     Raises:
         InputError: not an image.
     """
-    decoded = decode_heads(network.heads(image), pattern)
-    light = "" if not decoded.reason else _fault_of_light(one_channel(image))
+    decoded = decode_heads(network.heads(image), pattern, settings)
+    light = "" if not decoded.reason else _fault_of_light(one_channel(image), settings)
     return replace(decoded, reason=f"{light}{decoded.reason}")
 
 
-def _fault_of_light(gray: NDArray[np.float32]) -> str:
-    if np.quantile(gray, 0.99) < DARK:
+def _fault_of_light(gray: NDArray[np.float32], settings: MatcherSettings) -> str:
+    if np.quantile(gray, 0.99) < settings.dark:
         return "the image is dark: "
-    if (gray >= SATURATED).mean() > 0.5:
+    if (gray >= settings.saturated).mean() > 0.5:
         return "the image is saturated: "
     return ""
 
 
-def decode_heads(heads: Heads, pattern: CodedGrid) -> DecodedGrid:
+def decode_heads(
+    heads: Heads, pattern: CodedGrid, settings: MatcherSettings = DEFAULTS
+) -> DecodedGrid:
     """Decode the network's outputs for one image.
 
     Raises:
         InputError: no code of the pattern's size was found.
     """
-    heads = smoothed(heads)
-    graph = build_graph(heads)
-    identity = identify(graph, pattern.code)
-    lattice = unwrap(heads, graph.nodes, identity)
+    heads = smoothed(heads, settings.phase_smoothing)
+    graph = build_graph(heads, settings)
+    assignment = assign_nodes(graph, pattern.code, settings)
+    lattice = unwrap(heads, graph.nodes, assignment, settings)
     q = pattern.pixels(lattice).astype(np.float32)
     half = np.array([pattern.width, pattern.height], np.float32) / 2
     q[larger((q - half + 0.5) / half) > 1] = np.nan
-    q[~agreeing(q, slack=pattern.period / 8)] = np.nan
+    q[~locally_consistent(q, pattern.period * settings.neighbour_slack)] = np.nan
     known = np.isfinite(q[..., 0])
     confidence = np.where(known, heads.confidence, 0).astype(np.float32)
-    return DecodedGrid(q, confidence, graph, identity, "" if known.any() else _reason(graph))
+    reason = "" if known.any() else _reason(graph, settings.least_nodes)
+    return DecodedGrid(q, confidence, graph, assignment, reason)
 
 
-def _reason(graph: GridGraph) -> str:
+def smoothed(heads: Heads, sigma: float) -> Heads:
+    """Return heads whose phase is averaged over ``sigma`` pixels by confidence, on the circle."""
+    weight = np.maximum(heads.confidence, 1e-3)[..., None]
+    angle = 2 * np.pi * heads.phase
+    parts = (cv2.GaussianBlur(f(angle) * weight, (0, 0), sigma) for f in (np.sin, np.cos))
+    turns = np.arctan2(*parts) / (2 * np.pi)
+    return replace(heads, phase=turns.astype(np.float32))
+
+
+def _reason(graph: GridGraph, least: int) -> str:
     linked = int((graph.component >= 0).sum())
-    if linked < FEW_NODES:
+    if linked < least:
         return "no grid was found"
     return f"a grid of {linked} nodes was found, but not this pattern's code"

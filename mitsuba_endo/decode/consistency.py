@@ -7,7 +7,7 @@ SUPPORT = 3
 """Neighbours, of eight, that must agree: fewer happen by chance, or on a line of wrong code."""
 
 
-def agreeing(q: NDArray[np.float32], slack: float) -> NDArray[np.bool_]:
+def locally_consistent(q: NDArray[np.float32], slack: float) -> NDArray[np.bool_]:
     """Return the pixels (H, W) that at least three of their neighbours support.
 
     A neighbour supports a pixel if they differ on both axes by less than ``slack`` and four times
@@ -21,9 +21,9 @@ def agreeing(q: NDArray[np.float32], slack: float) -> NDArray[np.bool_]:
     padded = np.pad(q, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
     height, width = q.shape[:2]
     shifts = [(y, x) for y in range(3) for x in range(3) if (y, x) != (1, 1)]
-    apart = (np.abs(padded[y : y + height, x : x + width] - q) for y, x in shifts)
+    differences = (np.abs(padded[y : y + height, x : x + width] - q) for y, x in shifts)
     # NumPy reduces a last axis of length two far more slowly than this.
-    steps = np.stack([np.maximum(a[..., 0], a[..., 1]) for a in apart])
+    steps = np.stack([np.maximum(a[..., 0], a[..., 1]) for a in differences])
     known = np.isfinite(steps)
     if not known.any():
         return np.zeros((height, width), bool)

@@ -1,9 +1,10 @@
-"""Drawing coordinates towards planes, against planes whose noise is known."""
+"""Smoothing coordinates by fitted planes, against planes whose noise is known."""
 
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.grid.planes import drawn_to_planes
+from mitsuba_endo.decode.grid.decode import DEFAULTS
+from mitsuba_endo.decode.grid.phase_unwrapping import smoothed_by_planes
 
 NOISE = 0.04
 """Periods."""
@@ -20,23 +21,23 @@ def test_noise(confidence: float, most: float):
     """A plane with noise. Oracle: the plane; borders, where fits are one-sided, are included."""
     plane = ramp()
     noisy = plane + np.random.default_rng(0).normal(0, NOISE, plane.shape).astype(np.float32)
-    found = drawn_to_planes(noisy, np.full(plane.shape[:2], confidence, np.float32))
-    assert np.std(found - plane) < most * NOISE + 1e-6
+    smooth = smoothed_by_planes(noisy, np.full(plane.shape[:2], confidence, np.float32), DEFAULTS)
+    assert np.std(smooth - plane) < most * NOISE + 1e-6
     if most == 1:
-        np.testing.assert_array_equal(found, noisy)
+        np.testing.assert_array_equal(smooth, noisy)
 
 
 def test_a_plane_stays():
     """No noise, and holes in the map. Oracle: a plane is its own fit, holes stay holes."""
     plane = ramp()
     plane[20:30, 15:40] = np.nan
-    found = drawn_to_planes(plane, np.full(plane.shape[:2], 0.4, np.float32))
-    np.testing.assert_allclose(found, plane, atol=2e-3)
+    smooth = smoothed_by_planes(plane, np.full(plane.shape[:2], 0.4, np.float32), DEFAULTS)
+    np.testing.assert_allclose(smooth, plane, atol=2e-3)
 
 
 def test_folds_stay():
     """Two planes two periods apart. Oracle: beside the fold no pixel moves by a tenth."""
     plane = ramp()
     plane[:, 40:] += 2.0
-    found = drawn_to_planes(plane, np.full(plane.shape[:2], 0.4, np.float32))
-    assert np.abs(found - plane)[:, 36:44].max() < 0.1
+    smooth = smoothed_by_planes(plane, np.full(plane.shape[:2], 0.4, np.float32), DEFAULTS)
+    assert np.abs(smooth - plane)[:, 36:44].max() < 0.1
