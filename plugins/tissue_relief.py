@@ -47,25 +47,25 @@ class TissueRelief:
     def __init__(self, props: Any) -> None:
         mi.Texture.__init__(self, props)
         self.slope = mi.Float(props.get("slope", 0.15))
-        self.placement = field_frame(int(props.get("seed", 0)))
+        self.field = field_frame(int(props.get("seed", 0)))
         self.parameters_changed()
 
     def traverse(self, callback: Any) -> None:
         callback.put("slope", self.slope, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: Any = ()) -> None:
-        make_opaque(self.slope, *self.placement)
+        make_opaque(self.slope, *self.field)
 
     def eval_1(self, si: Any, active: Any = True) -> Any:
-        return self.slope * relief(to_field(self.placement, si.p))[0]
+        return self.slope * relief(to_field(self.field, si.p))[0]
 
     def eval(self, si: Any, active: Any = True) -> Any:
         return mi.UnpolarizedSpectrum(self.eval_1(si, active))
 
     def eval_1_grad(self, si: Any, active: Any = True) -> Any:
         """Return the height's derivatives along u and v by the chain rule."""
-        slope = mi.Vector3f(*relief(to_field(self.placement, si.p))[1])
-        world = self.slope * (self.placement[0].T @ slope)
+        slope = mi.Vector3f(*relief(to_field(self.field, si.p))[1])
+        world = self.slope * (self.field[0].T @ slope)
         return mi.Vector2f(dr.dot(world, si.dp_du), dr.dot(world, si.dp_dv))
 
     def mean(self) -> Any:

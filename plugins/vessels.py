@@ -2,13 +2,14 @@
 
 from typing import Any
 
-from mitsuba_endo.capture.solid_fields import Placement
+from mitsuba_endo.capture.solid_fields import field_from_tissue
 from mitsuba_endo.capture.vessels import ABSORPTION, vessel_density
 from mitsuba_endo.rendering.untyped import mi
 
 from .variants import make_opaque, variant_class
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear red, green and blue (Rec. 709)."""
 
 
 class Vessels:
@@ -61,7 +62,7 @@ class Vessels:
         self.base = props.get_texture("base", 1.0)
         self.contrast = mi.Float(props.get("contrast", 0.5))
         self.scale = mi.Float(props.get("scale", 6.0))
-        self.placement = field_frame(int(props.get("seed", 0)))
+        self.field = field_frame(int(props.get("seed", 0)))
         self.parameters_changed()
 
     def traverse(self, callback: Any) -> None:
@@ -71,11 +72,11 @@ class Vessels:
         callback.put("scale", self.scale, differentiable)
 
     def parameters_changed(self, keys: Any = ()) -> None:
-        make_opaque(self.contrast, self.scale, *self.placement)
+        make_opaque(self.contrast, self.scale, *self.field)
 
     def _passed(self, si: Any) -> tuple[Any, Any, Any]:
         """Return the share of red, green and blue that vessels let through."""
-        taken = self.contrast * vessel_density(to_field(self.placement, si.p), self.scale)
+        taken = self.contrast * vessel_density(to_field(self.field, si.p), self.scale)
         r, g, b = (1 - a * taken for a in ABSORPTION)
         return r, g, b
 
@@ -108,9 +109,9 @@ class Vessels:
 
 def field_frame(seed: int) -> tuple[Any, Any]:
     """Return the rotation and shift that place a seed's tissue in the field."""
-    placement = Placement.of_seed(seed)
-    x, y, z = (float(c) for c in placement.t)
-    return mi.Matrix3f(placement.R.tolist()), mi.Vector3f(x, y, z)
+    field = field_from_tissue(seed)
+    x, y, z = (float(c) for c in field.t)
+    return mi.Matrix3f(field.R.tolist()), mi.Vector3f(x, y, z)
 
 
 def to_field(frame: tuple[Any, Any], point: Any) -> tuple[Any, Any, Any]:

@@ -12,17 +12,17 @@ import typer
 from numpy.typing import NDArray
 
 from mitsuba_endo import backend
+from mitsuba_endo.dataset.truth import MIXED, largest_step
 from mitsuba_endo.decode.network import load_network
-from mitsuba_endo.learn.compose import NEAR_NODE, Truth
+from mitsuba_endo.learn.compose import NEAR_NODE, Targets
 from mitsuba_endo.learn.metrics import pixel_metrics
-from mitsuba_endo.learn.views import MIXED, largest_step
 from scripts.benchmarks.decoder_scenes import KINDS, PATTERN, Shot, shoot
 
 Option = typer.Option
 SHOWN = ("median", "p95", "gross", "coverage", "code_right", "false_share")
 
 
-def truth_of(shot: Shot, visible: NDArray[np.bool_]) -> Truth:
+def truth_of(shot: Shot, visible: NDArray[np.bool_]) -> Targets:
     """Return what the network should have said of a shot, with the benchmark's idea of lit.
 
     Depth edges in shadow are unknown here: edges are left out.
@@ -33,7 +33,7 @@ def truth_of(shot: Shot, visible: NDArray[np.bool_]) -> Truth:
     near = lit & (np.abs(known.lattice - known.node) < NEAR_NODE).all(-1)
     lattice = np.where(lit[..., None], known.lattice, 0).astype(np.float32)
     code = np.where(near, 1 - known.code, -1).astype(np.int8)
-    return Truth(lattice.transpose(2, 0, 1), lit, code, np.zeros_like(lit))
+    return Targets(lattice.transpose(2, 0, 1), lit, code, np.zeros_like(lit))
 
 
 def main(

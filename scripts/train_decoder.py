@@ -15,7 +15,7 @@ import torch  # pyright: ignore[reportMissingImports]
 import typer
 
 from mitsuba_endo.learn.cache import CacheSettings, open_cache
-from mitsuba_endo.learn.loop import Plan, train
+from mitsuba_endo.learn.loop import TrainingPlan, train
 from mitsuba_endo.learn.validation import validation_images
 
 Option = typer.Option
@@ -42,8 +42,8 @@ def main(
     torch.set_num_threads(threads)
     # OpenCV's own threads do not survive the fork of the processes that make examples.
     cv2.setNumThreads(0)
-    plan = Plan(minutes=minutes, steps=steps, batch=batch, rate=rate, epoch=epoch, seed=seed,
-                workers=workers)  # fmt: skip
+    plan = TrainingPlan(minutes=minutes, steps=steps, batch=batch, rate=rate, epoch=epoch,
+                        seed=seed, workers=workers)  # fmt: skip
 
     def tick(done: int) -> None:
         if done % 20 == 0:

@@ -43,8 +43,8 @@ def check_winding(mesh: Mesh, source: str) -> None:
         InputError: more than 1 % of the edges join faces wound against each other.
     """
     i, j = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    ways = np.sort(i * len(mesh.vertices) + j)
-    conflicts = float((np.diff(ways) == 0).sum() / len(i))
+    directed = np.sort(i * len(mesh.vertices) + j)
+    conflicts = float((np.diff(directed) == 0).sum() / len(i))
     if conflicts > CONFLICTS:
         raise InputError(
             f"{100 * conflicts:.0f} % of the edges join faces that are wound against each other",
@@ -67,17 +67,17 @@ def check_pattern(pattern: NDArray[np.floating]) -> None:
         raise InputError("is black", "pattern", "give a pattern with some light")
 
 
-def check_view(seen: float, from_behind: float) -> None:
+def check_view(hit: float, from_behind: float) -> None:
     """Refuse a camera that sees nothing, or tissue from its inner side.
 
     Args:
-        seen: share of the pixels that see the mesh.
+        hit: share of the pixels that see the mesh.
         from_behind: share of those that see faces pointing away.
 
     Raises:
         InputError: one of the two.
     """
-    if seen == 0:
+    if hit == 0:
         raise InputError(
             "the camera sees nothing of the mesh", "world_from_camera",
             "check the pose, in mm, and that the mesh is before the camera",

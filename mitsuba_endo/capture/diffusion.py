@@ -34,8 +34,8 @@ def scattering_albedo(reflectance: float, index: float) -> float:
     """Return the single-scattering albedo of a half-space that sends back ``reflectance``."""
     if reflectance >= 1:
         return 1.0
-    found = root_scalar(lambda a: diffuse_reflectance(a, index) - reflectance, bracket=(0, 1))
-    return float(found.root)
+    root = root_scalar(lambda a: diffuse_reflectance(a, index) - reflectance, bracket=(0, 1))
+    return float(root.root)
 
 
 @lru_cache(maxsize=256)

@@ -17,7 +17,7 @@ from .effects.encoding import Encoded
 from .settings import CaptureSettings
 
 if TYPE_CHECKING:
-    from .studio import Studio
+    from .photograph_scene import PhotographScene
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +63,20 @@ def photograph(
         InputError: a mesh in other units or wound at random, no pattern, or a camera that sees
             nothing or stands inside the wall (see :mod:`.checks`).
     """
-    studio = open_studio(mesh, camera, projector, pattern, settings, pattern_size)
-    studio.place(world_from_camera, projector_from_camera)
-    return develop(studio, camera, settings, seed)
+    scene = load_scene(mesh, camera, projector, pattern, settings, pattern_size)
+    scene.set_poses(world_from_camera, projector_from_camera)
+    return take_photograph(scene, camera, settings, seed)
 
 
-def open_studio(
+def load_scene(
     mesh: Mesh,
     camera: CameraModel,
     projector: ProjectorModel,
     pattern: NDArray[np.float32],
     settings: CaptureSettings,
     pattern_size: tuple[int, int] | None = None,
-) -> "Studio":
-    """Return the scene of a photograph whose poses are to be found; arguments as above.
+) -> "PhotographScene":
+    """Return the scene of a photograph whose poses are still to be set; arguments as above.
 
     Raises:
         InputError: a mesh in other units or wound at random, or no pattern.
@@ -84,17 +84,17 @@ def open_studio(
     check_mesh(mesh)
     check_pattern(pattern)
     backend.ensure()
-    from .studio import SetUp, Studio
+    from .photograph_scene import PhotographScene, SceneParts
 
     size = pattern_size or (pattern.shape[1], pattern.shape[0])
-    return Studio(SetUp(mesh, camera, projector, pattern, size), settings)
+    return PhotographScene(SceneParts(mesh, camera, projector, pattern, size), settings)
 
 
-def develop(
-    studio: "Studio", camera: CameraModel, settings: CaptureSettings, seed: int
+def take_photograph(
+    scene: "PhotographScene", camera: CameraModel, settings: CaptureSettings, seed: int
 ) -> Photograph:
-    """Return the photograph that a studio's camera takes from where it was placed."""
-    laser, lamp = studio.trace(seed)
+    """Return the photograph of a scene from the poses that it was set to."""
+    laser, lamp = scene.trace(seed)
     radiance = laser + lamp
     image = apply_effects(
         radiance, settings.effects, seed, laser=laser, cosine=cosine_to_axis(camera)

@@ -7,38 +7,30 @@ for all seeds. Formulas run on NumPy and Dr.Jit components alike.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..geometry.arrays import Array, namespace
+from ..geometry.transforms import RigidTransform
 
 _WAVES = 8
+"""Plane waves in a sum: by then its values are nearly normal, and each more costs a sine."""
 _CELLS = 3
 """Fields that compete in a network; fewer would give closed curves, more cost more."""
 _SHIFT_MM = 1000.0
+"""Largest shift along an axis, mm: a hundred times the longest wave, so that seeds differ."""
 
 Vector = tuple[Array, Array, Array]
 
 
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """Where in the field a piece of tissue lies: p_field = R p + t."""
-
-    R: NDArray[np.float64]
-    """(3, 3) rotation."""
-    t: NDArray[np.float64]
-    """(3,) mm."""
-
-    @classmethod
-    def of_seed(cls, seed: int) -> "Placement":
-        rng = np.random.default_rng(seed)
-        R = Rotation.from_quat(rng.normal(size=4)).as_matrix()
-        return cls(R, rng.uniform(-_SHIFT_MM, _SHIFT_MM, 3))
+def field_from_tissue(seed: int) -> RigidTransform:
+    """Return where in the field the tissue of a seed lies, mm."""
+    rng = np.random.default_rng(seed)
+    R = Rotation.from_quat(rng.normal(size=4)).as_matrix()
+    return RigidTransform(R, rng.uniform(-_SHIFT_MM, _SHIFT_MM, 3))
 
 
 def waves(p: Sequence[Array], wavelength: float, family: int) -> tuple[Array, Vector]:

@@ -59,10 +59,10 @@ class _Grid:
     def __init__(self, points: NDArray[np.float32], pixels_per_mm: NDArray[np.float32]) -> None:
         self._height, self._width = points.shape[:2]
         flat = points.reshape(-1, 3)
-        known = ~np.isnan(flat[:, 0])
-        self._known = mi.Bool(known)
-        self._point = mi.Point3f(np.ascontiguousarray(np.where(known[:, None], flat, 0).T))
-        self._scale = mi.Float(np.where(known, pixels_per_mm.ravel(), 0).astype(np.float32))
+        hit = ~np.isnan(flat[:, 0])
+        self._hit = mi.Bool(hit)
+        self._point = mi.Point3f(np.ascontiguousarray(np.where(hit[:, None], flat, 0).T))
+        self._scale = mi.Float(np.where(hit, pixels_per_mm.ravel(), 0).astype(np.float32))
         index = dr.arange(mi.Int32, len(flat))
         self._x, self._y = index % self._width, index // self._width
         dr.eval(self._x, self._y)
@@ -78,9 +78,9 @@ class _Grid:
             offset = mi.Int32(dr.round(tap * step))
             x = self._x + offset if along_rows else self._x
             y = self._y if along_rows else self._y + offset
-            inside = (x >= 0) & (x < self._width) & (y >= 0) & (y < self._height) & self._known
+            inside = (x >= 0) & (x < self._width) & (y >= 0) & (y < self._height) & self._hit
             index = mi.UInt32(y * self._width + x)
-            inside &= dr.gather(mi.Bool, self._known, index, inside)
+            inside &= dr.gather(mi.Bool, self._hit, index, inside)
             away = dr.gather(mi.Point3f, self._point, index, inside) - self._point
             weight = dr.select(inside, dr.exp(narrow * dr.squared_norm(away)), 0.0)
             weights += weight
@@ -88,7 +88,7 @@ class _Grid:
                 t + weight * dr.gather(mi.Float, c, index, inside)
                 for t, c in zip(total, colour, strict=True)
             ]
-        blurred = [dr.select(self._known, t / weights, c)
+        blurred = [dr.select(self._hit, t / weights, c)
                    for t, c in zip(total, colour, strict=True)]  # fmt: skip
         dr.eval(blurred)
         return blurred

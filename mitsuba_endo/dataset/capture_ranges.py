@@ -98,8 +98,8 @@ def _checked(model: type[Record], given: Ranges) -> Ranges:
     for name, range_ in given.items():
         field = model.model_fields.get(name)
         if field is None:
-            known = ", ".join(model.model_fields)
-            raise ValueError(f"there is no '{name}'; choose among {known}")
+            names = ", ".join(model.model_fields)
+            raise ValueError(f"there is no '{name}'; choose among {names}")
         for value in range_.values:
             try:
                 model.model_validate({name: value})

@@ -4,7 +4,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
 from pydantic import (
     Field,
     PositiveFloat,
@@ -14,7 +13,6 @@ from pydantic import (
     model_validator,
 )
 
-from ..files import atomic_path
 from ..geometry.cameras import CAMERAS
 from ..geometry.laws import LAWS
 from ..records.validation import read_yaml, validate
@@ -38,7 +36,9 @@ from .ranges import (
 )
 
 FILE = "file"
+"""Kind of a scene whose surface the user gives."""
 LUMEN = "colon"
+"""Kind of a scene that is seen from inside and may have polyps."""
 Seed = Annotated[int, Field(ge=0)]
 
 DEFAULT_SCENES: list[dict[str, Any]] = [
@@ -80,10 +80,10 @@ DEFAULT_SCENES: list[dict[str, Any]] = [
 ]  # fmt: skip
 
 
-def _among(range_: Range, known: Any, what: str) -> Range:
+def _among(range_: Range, names: Any, what: str) -> Range:
     for value in range_.values:
-        if value not in known:
-            raise ValueError(f"unknown {what} '{value}'; choose from {', '.join(known)}")
+        if value not in names:
+            raise ValueError(f"unknown {what} '{value}'; choose from {', '.join(names)}")
     return range_
 
 
@@ -99,7 +99,7 @@ class Polyps(Section):
     """Distance from the camera along the lumen, mm."""
 
 
-class View(Section):
+class ViewRanges(Section):
     """Where the camera stands before the surface."""
 
     tilt: Degrees = uniform(0.0, 25.0)
@@ -134,7 +134,7 @@ class Scene(Section):
     side: Literal["front", "outside", "inside"] = "front"
     """From where the file's surface is seen: the side its faces' normals point to, outside of a
     solid, or inside of a lumen. The last two are found out, however the faces are wound."""
-    view: View = View()
+    view: ViewRanges = ViewRanges()
 
     @field_validator("kind")
     @classmethod
@@ -160,9 +160,9 @@ class Scene(Section):
         """Build the shape's record, which checks its values, with each range's ends."""
         unknown = sorted(set(self.parameters) - set(parameter_names(self.kind)))
         if unknown:
-            known = ", ".join(parameter_names(self.kind))
+            names = ", ".join(parameter_names(self.kind))
             raise ValueError(
-                f"parameters.{unknown[0]}: a {self.kind} has no such parameter; it has {known}"
+                f"parameters.{unknown[0]}: a {self.kind} has no such parameter; it has {names}"
             )
         if "polyps" in self.parameters:
             raise ValueError("parameters.polyps: write polyps as a key of the scene")
@@ -184,7 +184,7 @@ def default_scenes() -> list[Scene]:
     return [Scene.model_validate(scene) for scene in DEFAULT_SCENES]
 
 
-class Placing(Section):
+class PoseRules(Section):
     """What a drawn view must fulfil; views that do not are drawn again."""
 
     margin: PositiveFloat = 2.0
@@ -305,7 +305,7 @@ class PatternRanges(Section):
     """Texels per pattern pixel."""
 
 
-class Store(Section):
+class StoreOptions(Section):
     """What is kept of each sample besides image and maps."""
 
     radiance: bool = True
@@ -323,9 +323,9 @@ class Config(Section):
     """A folder of files a sample, for people; or HDF5 shards, for training."""
     shard: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Samples in an HDF5 shard."""
-    store: Store = Store()
+    store: StoreOptions = StoreOptions()
     scenes: Annotated[list[Scene], Field(min_length=1)] = Field(default_factory=default_scenes)
-    placing: Placing = Placing()
+    placing: PoseRules = PoseRules()
     camera: CameraRanges = CameraRanges()
     projector: ProjectorRanges = ProjectorRanges()
     pattern: PatternRanges = PatternRanges()
@@ -356,16 +356,3 @@ def example_config() -> str:
     return (
         resources.files("mitsuba_endo.dataset").joinpath("example.yaml").read_text(encoding="utf-8")
     )
-
-
-def save_config(path: str | Path, config: Config) -> None:
-    """Write a configuration with every default spelt out.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    text = yaml.safe_dump(
-        config.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=100
-    )
-    with atomic_path(path) as aside:
-        aside.write_text(text, encoding="utf-8")

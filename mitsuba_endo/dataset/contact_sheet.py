@@ -9,17 +9,21 @@ from numpy.typing import NDArray
 
 from ..files import atomic_path
 from . import contents
+from .contents import Stored
 from .reader import Dataset
-from .stored import Stored
 
 COLUMNS, ROWS = 3, 6
+"""Tiles on a sheet: at their width it fits a screen."""
 THUMB = 256
 """Width of a picture, pixels."""
 GAP, LABEL = 8, 20
+"""Pixels between tiles, and for a line of text."""
 SHEETS = 16
 """Most sheets of one dataset; of larger ones, samples are chosen evenly."""
 UNSEEN, SHADOW, LINE = (225, 225, 225), (70, 70, 80), (255, 255, 255)
+"""8-bit RGB."""
 DPI = 100
+"""Dots per inch of the figure, which make 8 points of text 11 pixels high."""
 
 Image = NDArray[np.uint8]
 
@@ -81,9 +85,11 @@ def _height(sample: Stored) -> int:
 
 def caption(sample: Stored) -> str:
     """Return number, kind and polyps of a sample."""
-    told = sample.description
-    sizes = ", ".join(f"{polyp['diameter']:.1f}" for polyp in told["polyps"])
-    return f"{told['index']}  {told['kind']}" + (f", polyps {sizes} mm" if sizes else "")
+    description = sample.description
+    sizes = ", ".join(f"{polyp['diameter']:.1f}" for polyp in description["polyps"])
+    return f"{description['index']}  {description['kind']}" + (
+        f", polyps {sizes} mm" if sizes else ""
+    )
 
 
 def photograph(sample: Stored) -> Image:
@@ -130,5 +136,7 @@ def grid_lines(phase: NDArray[np.floating]) -> NDArray[np.bool_]:
 
 def _resized(image: Image, sample: Stored) -> Image:
     size = THUMB, _height(sample)
-    way = cv2.INTER_AREA if image.shape[1] > THUMB else cv2.INTER_NEAREST
-    return np.asarray(cv2.resize(np.ascontiguousarray(image), size, interpolation=way), np.uint8)
+    interpolation = cv2.INTER_AREA if image.shape[1] > THUMB else cv2.INTER_NEAREST
+    return np.asarray(
+        cv2.resize(np.ascontiguousarray(image), size, interpolation=interpolation), np.uint8
+    )

@@ -5,17 +5,18 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .work import Job, Result, prepare, produce
+from .work import DatasetJob, Result, prepare, produce
 
 AHEAD = 2
 """Samples handed out per worker: one being made and one waiting."""
 CONNECT_S = 5
+"""Seconds in which a scheduler must answer: one on the network does within one."""
 
 
 class DaskPool:
     """Every worker of a cluster; they must see the dataset's folder under the same path."""
 
-    def __init__(self, job: Job, address: str) -> None:
+    def __init__(self, job: DatasetJob, address: str) -> None:
         self._job, self._client = job, _connect(address)
         self._workers = self._check(address)
 
@@ -55,9 +56,9 @@ class DaskPool:
                 "has workers of several threads, in which Mitsuba cannot start", address,
                 "start them with --nthreads 1",
             )  # fmt: skip
-        marker = self._job.workshop()
-        seen = self._client.run(Path.is_dir, marker)
-        blind = [worker for worker, sees in seen.items() if not sees]
+        marker = self._job.assets()
+        visible = self._client.run(Path.is_dir, marker)
+        blind = [worker for worker, sees in visible.items() if not sees]
         if blind:
             self._fail(
                 f"its worker {blind[0]} does not see the folder", self._job.out,
@@ -85,7 +86,7 @@ def _connect(address: str) -> Any:
         ) from None
 
 
-def _produce(job: Job, index: int) -> Result:
+def _produce(job: DatasetJob, index: int) -> Result:
     """Make a sample on a worker, which stays prepared from its first sample on."""
     import sys
 

@@ -19,10 +19,9 @@ from ..records.solution import save_solution
 from ..records.surface import load_surface, save_surface
 from ..records.validation import read_json
 from . import contents
-from .contents import Arrays
+from .contents import Arrays, Stored, numbered
 from .digests import file_digest
 from .sample import MAP, Sample
-from .stored import Stored, numbered
 
 SAMPLES = "samples"
 DESCRIPTION = "sample.json"

@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from .work import Job, Result, prepare, produce
+from .work import DatasetJob, Result, prepare, produce
 
 RETRIES = 1
 """Times a sample is tried again whose worker was killed."""
 RECYCLE = 250
 """Samples after which a worker is replaced: Mitsuba keeps a little memory of every scene."""
 PATIENCE_S = 5.0
+"""Seconds that a worker has to end by itself: a render of a usual sample takes less."""
 
 
 @dataclass(eq=False)
@@ -40,10 +41,10 @@ class LocalPool:
 
     def __init__(
         self,
-        job: Job,
+        job: DatasetJob,
         workers: int,
         prepare: Callable[[], None] = prepare,
-        produce: Callable[[Job, int], Result] = produce,
+        produce: Callable[[DatasetJob, int], Result] = produce,
         recycle: int = RECYCLE,
     ) -> None:
         """Describe the workers; they start when there is work.
@@ -149,9 +150,9 @@ class LocalPool:
 
 def _serve(
     connection: Any,
-    job: Job,
+    job: DatasetJob,
     prepare: Callable[[], None],
-    produce: Callable[[Job, int], Result],
+    produce: Callable[[DatasetJob, int], Result],
 ) -> None:
     """Make the samples whose numbers come in, until the other end closes."""
     # Ctrl-C reaches the whole group; the parent decides.

@@ -1,19 +1,22 @@
 """Drawing cameras, projectors, and the projector's pose in the channel."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.cameras import CameraModel
+from ..geometry.endoscope import aimed_projector
 from ..geometry.laws import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
 from .config import CameraRanges, ProjectorRanges
 
 CAMERA_TRIES = 50
+"""Cameras drawn before the ranges are refused: by then fewer than one in ten can be used."""
 ROUND_TRIP_PX = 0.05
+"""Pixels by which projecting a pixel's ray may miss it: far beyond rounding, below what is seen."""
 
 
 def draw_camera(ranges: CameraRanges, rng: np.random.Generator) -> CameraModel:
@@ -61,31 +64,18 @@ def draw_projector(
     )
 
 
-@dataclass(frozen=True)
-class ProjectorDraw:
-    """The channel of one endoscope, in which the projector's pose is drawn."""
-
-    ranges: ProjectorRanges
-
-    def pose(self, rng: np.random.Generator) -> RigidTransform:
-        """Return a drawn projector_from_camera, mm."""
-        ranges = self.ranges
-        bearing = np.radians(ranges.bearing.draw(rng))
-        baseline = ranges.baseline.draw(rng)
-        place = np.array(
-            [baseline * np.cos(bearing), baseline * np.sin(bearing), ranges.ahead.draw(rng)]
-        )
-        towards = np.array([0.0, 0.0, place[2] + ranges.meeting.draw(rng)]) - place
-        angles = [ranges.tilt.draw(rng), ranges.tilt.draw(rng), ranges.roll.draw(rng)]
-        turn: Any = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
-        return RigidTransform(_swung(towards) @ turn, place).inverse()
+def draw_projector_pose(ranges: ProjectorRanges, rng: np.random.Generator) -> RigidTransform:
+    """Return a projector_from_camera, mm, of a projector in the channel beside the camera."""
+    bearing = np.radians(ranges.bearing.draw(rng))
+    baseline = ranges.baseline.draw(rng)
+    centre = np.array(
+        [baseline * np.cos(bearing), baseline * np.sin(bearing), ranges.ahead.draw(rng)]
+    )
+    target = [0.0, 0.0, centre[2] + ranges.meeting.draw(rng)]
+    angles = [ranges.tilt.draw(rng), ranges.tilt.draw(rng), ranges.roll.draw(rng)]
+    return aimed_projector(centre, target, rotation_from_angles(angles))
 
 
-def _swung(axis: np.ndarray) -> np.ndarray:
-    """Return the smallest rotation (3, 3) that takes +z to ``axis`` (3,)."""
-    unit = axis / np.linalg.norm(axis)
-    about = np.cross([0.0, 0.0, 1.0], unit)
-    sine = np.linalg.norm(about)
-    if sine < 1e-12:
-        return np.eye(3)
-    return Rotation.from_rotvec(about / sine * np.arctan2(sine, unit[2])).as_matrix()
+def rotation_from_angles(degrees: Sequence[float]) -> NDArray[np.float64]:
+    """Return the rotation (3, 3) about the x axis, then the new y axis, then the new z axis."""
+    return Rotation.from_euler("XYZ", degrees, degrees=True).as_matrix()

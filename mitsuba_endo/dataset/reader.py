@@ -5,10 +5,10 @@ from pathlib import Path
 from ..errors import InputError
 from ..records.validation import read_json, validate
 from .config import Config
+from .contents import Store, Stored
 from .folder_store import FolderStore
 from .run import DATASET
 from .shard_store import ShardStore
-from .stored import Store, Stored
 
 
 class Dataset:

@@ -9,20 +9,23 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Protocol
 
+from filelock import FileLock, Timeout
+
 from ..errors import InputError
 from ..files import atomic_path
 from ..litter import sweep
 from ..records.validation import read_json
+from .asset_cache import clear_assets
 from .config import FILE, Config
+from .contents import Store, numbered
 from .digests import array_digest
-from .lock import locked
-from .stored import Store, numbered
-from .work import Job, Result
-from .workshop import clear_workshop
+from .work import DatasetJob, Result
 
 SCHEMA = 1
+"""Of dataset.json and manifest.json; changes whenever the meaning of a key does."""
 DATASET, MANIFEST, FAILED = "dataset.json", "manifest.json", "failed"
 PACKAGES = ("mitsuba-endo", "mitsuba", "drjit", "numpy")
+"""Whose versions decide what a sample is."""
 
 Advance = Callable[["Progress"], None]
 
@@ -57,7 +60,7 @@ def make_dataset(
     config: Config,
     out: str | Path,
     count: int,
-    pool: Callable[[Job], Pool],
+    pool: Callable[[DatasetJob], Pool],
     advance: Advance = lambda progress: None,
     retry_failed: bool = False,
 ) -> Progress:
@@ -76,21 +79,41 @@ def make_dataset(
             configuration, or a surface that the user gives is unusable.
     """
     out = Path(out).absolute()
-    job = Job(config, str(out))
+    job = DatasetJob(config, str(out))
     began = _open_folder(out)
     with locked(out):
         try:
             _begin(job, out, count, began)
             return _make_and_list(job, out, count, pool, advance, retry_failed)
         finally:
-            clear_workshop(job.workshop())
+            clear_assets(job.assets())
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process; the system lets it go whatever ends the process.
+
+    Raises:
+        InputError: another process holds it.
+    """
+    lock = FileLock(folder / ".lock", timeout=0)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise InputError(
+            "another run is working in this folder", str(folder), "wait for it or stop it"
+        ) from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def _make_and_list(
-    job: Job,
+    job: DatasetJob,
     out: Path,
     count: int,
-    pool: Callable[[Job], Pool],
+    pool: Callable[[DatasetJob], Pool],
     advance: Advance,
     retry_failed: bool,
 ) -> Progress:
@@ -113,7 +136,7 @@ def _make_and_list(
 
 
 def _make_missing(
-    job: Job, store: Store, count: int, pool: Callable[[Job], Pool], advance: Advance
+    job: DatasetJob, store: Store, count: int, pool: Callable[[DatasetJob], Pool], advance: Advance
 ) -> Progress:
     wanted = range(count)
     done = store.indices().intersection(wanted)
@@ -142,7 +165,7 @@ def _make_missing(
     return progress
 
 
-def _record_failure(job: Job, result: Result) -> None:
+def _record_failure(job: DatasetJob, result: Result) -> None:
     record = {"index": result.index, "seed": job.config.seed, "status": result.status,
               "reason": result.reason}  # fmt: skip
     _write_json(_failure(job.out, result.index), record)
@@ -176,9 +199,9 @@ def _open_folder(out: Path) -> dict[str, Any] | None:
     return None
 
 
-def _begin(job: Job, out: Path, count: int, began: dict[str, Any] | None) -> None:
+def _begin(job: DatasetJob, out: Path, count: int, began: dict[str, Any] | None) -> None:
     """Prepare what samples share, and write down, or compare, what the dataset is made of."""
-    job.workshop().mkdir(exist_ok=True)
+    job.assets().mkdir(exist_ok=True)
     wanted = {
         "schema": SCHEMA,
         "units": "mm",
@@ -197,17 +220,17 @@ def _begin(job: Job, out: Path, count: int, began: dict[str, Any] | None) -> Non
     _write_json(out / DATASET, {**wanted, "count": count})
 
 
-def _prepare_surfaces(job: Job) -> dict[str, Any]:
+def _prepare_surfaces(job: DatasetJob) -> dict[str, Any]:
     """Check the surfaces that the user gives and keep them for the workers."""
-    from .workshop import given_path, save_mesh
+    from .asset_cache import save_mesh, user_mesh_path
 
     noted = {}
     for number, scene in enumerate(job.config.scenes):
         if scene.kind == FILE:
-            from .given import note, prepare_given
+            from .user_mesh import load_user_mesh, note
 
-            mesh = prepare_given(scene)
-            save_mesh(given_path(job.workshop(), number), mesh)
+            mesh = load_user_mesh(scene)
+            save_mesh(user_mesh_path(job.assets(), number), mesh)
             sums = array_digest(mesh.vertices), array_digest(mesh.faces)
             noted[str(number)] = {"file": scene.file, **note(mesh), "sha256": sums}
     return noted
@@ -219,9 +242,9 @@ def _difference(a: Any, b: Any, where: str = "") -> str | None:
         for key in [*a, *(k for k in b if k not in a)]:
             if key not in a or key not in b:
                 return f"{where}{key}"
-            found = _difference(a[key], b[key], f"{where}{key}.")
-            if found:
-                return found
+            difference = _difference(a[key], b[key], f"{where}{key}.")
+            if difference:
+                return difference
         return None
     return None if a == b else where.rstrip(".")
 

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..capture.photograph import develop, open_studio
+from ..capture.photograph import Photograph, load_scene, take_photograph
 from ..decode.grid_pattern import CodedGrid
-from ..geometry.cameras import CameraModel
+from ..geometry.endoscope import Endoscope
 from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
 from ..records.rig import Camera
 from ..records.solution import (
     Estimate,
@@ -20,13 +21,13 @@ from ..records.solution import (
     Solution,
 )
 from ..shapes.mesh import Mesh
+from .asset_cache import AssetCache
 from .config import Config
-from .optics import ProjectorDraw, draw_camera, draw_projector
-from .placing import Placed, find_place
+from .optics import draw_camera, draw_projector
+from .pose_sampler import PoseSampler, SampledPoses
 from .streams import stream
-from .surfaces import Surface, draw_surface
+from .surfaces import DrawnSurface, draw_surface
 from .truth import TruthMaps, truth_maps
-from .workshop import Workshop
 
 SCHEMA = 1
 """Of a sample's description; changes whenever the meaning of a key does."""
@@ -53,7 +54,7 @@ class Sample:
     """All that was drawn, as it stands in ``sample.json``."""
 
 
-def make_sample(config: Config, index: int, workshop: Workshop) -> Sample:
+def make_sample(config: Config, index: int, assets: AssetCache) -> Sample:
     """Return the sample of this number; Mitsuba must be running.
 
     The same configuration and number give the same sample to the last bit on one machine, if
@@ -62,36 +63,49 @@ def make_sample(config: Config, index: int, workshop: Workshop) -> Sample:
     Raises:
         InputError: what was drawn makes no picture, e.g. no place for the camera was found.
     """
-    surface, drawn_from = draw_surface(
-        config.scenes, stream(config.seed, "surface", index), workshop
-    )
+    surface, scene = draw_surface(config.scenes, stream(config.seed, "surface", index), assets)
     optics = stream(config.seed, "optics", index)
     variant = int(optics.integers(config.pattern.variants))
-    grid = workshop.grid(variant)
+    grid = assets.grid(variant)
     size = grid.width, grid.height
     camera = draw_camera(config.camera, optics)
     projector = draw_projector(config.projector, size, optics)
     settings = config.capture.draw(stream(config.seed, "capture", index))
-    # One scene for the search of a place, the picture and the truth: its search tree takes long.
-    studio = open_studio(surface.mesh, camera, projector, workshop.pattern(variant), settings, size)
-    placed = find_place(
-        surface.stance, drawn_from.view, config.placing, surface.mesh, studio.surface, camera,
-        projector, size, ProjectorDraw(config.projector), stream(config.seed, "place", index),
-    )  # fmt: skip
-    hits = studio.place(placed.world_from_camera, placed.projector_from_camera)
+    # One scene for poses, picture and truth: its search tree takes long.
+    photographed = load_scene(
+        surface.mesh, camera, projector, assets.pattern(variant), settings, size
+    )
+    sampler = PoseSampler(
+        config.placing, surface.mesh, photographed.surface, camera, projector, size
+    )
+    poses = sampler.sample(
+        surface.views, scene.view, config.projector, stream(config.seed, "place", index)
+    )
+    hits = photographed.set_poses(
+        poses.endoscope.world_from_camera, poses.endoscope.projector_from_camera
+    )
     seed = int(stream(config.seed, "photograph", index).integers(2**30))
-    picture = develop(studio, camera, settings, seed)
-    maps = truth_maps(
-        studio.surface, surface.mesh, camera, placed.world_from_camera, projector,
-        placed.projector_from_camera, grid, hits,
-    )  # fmt: skip
-    camera_from_world = placed.world_from_camera.inverse()
+    picture = take_photograph(photographed, camera, settings, seed)
+    maps = truth_maps(photographed.surface, surface.mesh, poses.endoscope, grid, hits)
     description = {
         "schema": SCHEMA, "index": index, "seed": config.seed, "units": "mm",
-        **_described(surface, camera, projector, placed, grid),
+        **_described(surface, poses, grid),
         "pattern": {"variant": variant, **asdict(grid)},
         "photograph": {"seed": seed, **settings.model_dump(mode="json")},
     }  # fmt: skip
+    return _sample(index, surface, poses.endoscope, picture, maps, size, description)
+
+
+def _sample(
+    index: int,
+    surface: DrawnSurface,
+    endoscope: Endoscope,
+    picture: Photograph,
+    maps: TruthMaps,
+    size: tuple[int, int],
+    description: dict[str, Any],
+) -> Sample:
+    camera_from_world = endoscope.world_from_camera.inverse()
     return Sample(
         index=index,
         kind=surface.kind,
@@ -99,45 +113,45 @@ def make_sample(config: Config, index: int, workshop: Workshop) -> Sample:
         radiance=np.minimum(picture.radiance, np.finfo(np.float16).max).astype(np.float16),
         maps=maps,
         mesh=Mesh(camera_from_world.apply(surface.mesh.vertices), surface.mesh.faces),
-        truth=_truth(camera, projector, placed, size),
+        truth=_truth(endoscope, size),
         description=description,
     )
 
 
-def _described(
-    surface: Surface,
-    camera: CameraModel,
-    projector: ProjectorModel,
-    placed: Placed,
-    grid: CodedGrid,
-) -> dict[str, Any]:
+def _described(surface: DrawnSurface, poses: SampledPoses, grid: CodedGrid) -> dict[str, Any]:
     """Return what sample.json says of surface and geometry."""
-    poses = {
-        name: {"R": pose.R.tolist(), "t": pose.t.tolist()}
-        for name, pose in (
-            ("world_from_camera", placed.world_from_camera),
-            ("projector_from_camera", placed.projector_from_camera),
-        )
-    }
+    endoscope = poses.endoscope
+    camera_from_world = endoscope.world_from_camera.inverse()
     return {
         "kind": surface.kind,
         "surface": surface.parameters,
-        "polyps": [_in_camera(polyp, placed) for polyp in surface.polyps],
-        "camera": Camera.from_model(camera).model_dump(mode="json"),
+        "polyps": [_in_camera(polyp, camera_from_world) for polyp in surface.polyps],
+        "camera": Camera.from_model(endoscope.camera).model_dump(mode="json"),
         "projector": {
-            "law": projector.law, "width": grid.width, "height": grid.height,
-            "focal": float(projector.focal), "centre": [float(c) for c in projector.centre],
-            "aspect": float(projector.aspect),
-            "distortion": [float(k) for k in projector.distortion.coefficients],
+            "law": endoscope.projector.law, "width": grid.width, "height": grid.height,
+            **_projector_values(endoscope.projector),
         },
-        **poses,
-        "placing": {"lit": placed.lit, "tries": placed.tries},
+        "world_from_camera": _pose_values(endoscope.world_from_camera),
+        "projector_from_camera": _pose_values(endoscope.projector_from_camera),
+        "placing": {"lit": poses.lit, "tries": poses.tries},
     }  # fmt: skip
 
 
-def _in_camera(polyp: dict[str, Any], placed: Placed) -> dict[str, Any]:
+def _projector_values(projector: ProjectorModel) -> dict[str, Any]:
+    return {
+        "focal": float(projector.focal),
+        "centre": [float(c) for c in projector.centre],
+        "aspect": float(projector.aspect),
+        "distortion": [float(k) for k in projector.distortion.coefficients],
+    }
+
+
+def _pose_values(pose: RigidTransform) -> dict[str, Any]:
+    return {"R": pose.R.tolist(), "t": pose.t.tolist()}
+
+
+def _in_camera(polyp: dict[str, Any], camera_from_world: RigidTransform) -> dict[str, Any]:
     """Return a polyp's truth in the camera's frame, in which everything else is."""
-    camera_from_world = placed.world_from_camera.inverse()
     return {
         **polyp,
         **{name: camera_from_world.apply(np.array(polyp[name])).tolist()
@@ -146,31 +160,26 @@ def _in_camera(polyp: dict[str, Any], placed: Placed) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _truth(
-    camera: CameraModel, projector: ProjectorModel, placed: Placed, size: tuple[int, int]
-) -> Solution:
-    def exact(value: float | list[float]) -> Estimate:
-        return Estimate(value=value, status="fixed")
-
+def _truth(endoscope: Endoscope, size: tuple[int, int]) -> Solution:
+    values = _projector_values(endoscope.projector)
     return Solution(
         outcome=Outcome.TRUTH,
         units="mm",
         scale="truth",
-        camera=Camera.from_model(camera),
+        camera=Camera.from_model(endoscope.camera),
         projector=ProjectorEstimate(
-            law=projector.law,
+            law=endoscope.projector.law,
             width=size[0],
             height=size[1],
-            focal=exact(float(projector.focal)),
-            centre=exact([float(c) for c in projector.centre]),
-            aspect=exact(float(projector.aspect)),
-            distortion=exact([float(k) for k in projector.distortion.coefficients]),
+            **{name: Estimate(value=value, status="fixed") for name, value in values.items()},
         ),
         frames=[
             Frame(
                 name=MAP,
-                projector_from_camera=PoseEstimate.of(placed.projector_from_camera, status="fixed"),
-                world_from_camera=PoseEstimate.of(placed.world_from_camera, status="fixed"),
+                projector_from_camera=PoseEstimate.of(
+                    endoscope.projector_from_camera, status="fixed"
+                ),
+                world_from_camera=PoseEstimate.of(endoscope.world_from_camera, status="fixed"),
             )
         ],
     )

@@ -10,9 +10,9 @@ from ..errors import InputError
 from ..files import atomic_path
 from ..litter import sweep
 from . import contents
+from .contents import Stored, numbered
 from .digests import array_digest, file_digest, text_digest
 from .sample import Sample
-from .stored import Stored, numbered
 
 STAGING = "staging"
 SHARDS = "shards"

@@ -8,18 +8,19 @@ from scipy.spatial.transform import Rotation
 
 from ..shapes import Mesh, Polyp, make_shape, parameter_names, parse_shape
 from ..shapes.colon import Colon
+from .asset_cache import FIGURE, AssetCache
 from .config import FILE, LUMEN, Polyps, Scene
 from .ranges import draw_all
-from .stances import Facing, InLumen, OnMesh, Stance
-from .workshop import FIGURE, Workshop
+from .view_sampler import LumenViews, MeshViews, SheetViews, ViewSampler
 
 LARGEST_POLYP = 0.6
 """Largest diameter of a polyp, as a share of the tube's radius: larger ones are drawn smaller."""
 POLYP_TRIES = 20
+"""Places drawn for a polyp before it is left out."""
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class DrawnSurface:
     """A surface and what is known about it."""
 
     kind: str
@@ -29,13 +30,13 @@ class Surface:
     """With which it can be made again."""
     polyps: list[dict[str, Any]]
     """Truth of each polyp, world frame, mm."""
-    stance: Stance
+    views: ViewSampler
     """From where it can be looked at."""
 
 
 def draw_surface(
-    scenes: list[Scene], rng: np.random.Generator, workshop: Workshop
-) -> tuple[Surface, Scene]:
+    scenes: list[Scene], rng: np.random.Generator, assets: AssetCache
+) -> tuple[DrawnSurface, Scene]:
     """Return a surface and the kind of scene it was drawn from.
 
     Raises:
@@ -45,31 +46,31 @@ def draw_surface(
     number = int(rng.choice(len(scenes), p=weights / weights.sum()))
     scene = scenes[number]
     if scene.kind == FILE:
-        mesh = workshop.given(number)
+        mesh = assets.user_mesh(number)
         made = {"file": scene.file, "unit": scene.unit, "side": scene.side}
-        return Surface(FILE, mesh, made, [], OnMesh(mesh, scene.side)), scene
+        return DrawnSurface(FILE, mesh, made, [], MeshViews(mesh, scene.side)), scene
     parameters = draw_all(scene.parameters, rng)
     if "seed" in parameter_names(scene.kind):
         parameters.setdefault("seed", int(rng.integers(2**31)))
     if scene.kind == LUMEN:
         return _colon(parameters, scene, rng), scene
-    mesh = _rabbit(parameters, workshop) if scene.kind == FIGURE else None
+    mesh = _rabbit(parameters, assets) if scene.kind == FIGURE else None
     mesh = mesh or make_shape(scene.kind, **parameters)
     shape: Any = parse_shape(scene.kind, **parameters)
-    return Surface(scene.kind, mesh, parameters, [], Facing(shape.distance)), scene
+    return DrawnSurface(scene.kind, mesh, parameters, [], SheetViews(shape.distance)), scene
 
 
-def _rabbit(parameters: dict[str, Any], workshop: Workshop) -> Mesh | None:
+def _rabbit(parameters: dict[str, Any], assets: AssetCache) -> Mesh | None:
     """Turn and scale the ready-made figure, whose making takes seconds; None for another edge."""
     if "edge" in parameters:
         return None
     shape: Any = parse_shape(FIGURE, **parameters)
-    figure = workshop.figure()
+    figure = assets.figure()
     turned = Rotation.from_euler("y", -shape.yaw).apply(figure.vertices)
     return Mesh(turned * shape.height + [0.0, 0.0, shape.distance], figure.faces)
 
 
-def _colon(parameters: dict[str, Any], scene: Scene, rng: np.random.Generator) -> Surface:
+def _colon(parameters: dict[str, Any], scene: Scene, rng: np.random.Generator) -> DrawnSurface:
     bare: Any = parse_shape(LUMEN, **parameters)
     at = float(scene.view.along.draw(rng)) * bare.length
     if scene.polyps is not None:
@@ -83,12 +84,12 @@ def _colon(parameters: dict[str, Any], scene: Scene, rng: np.random.Generator) -
         for p in colon.polyp_truth()
     ]  # fmt: skip
     noted = {**parameters, "polyps": [asdict(p) for p in colon.polyps]}
-    return Surface(LUMEN, colon.mesh(), noted, truth, InLumen(colon, at))
+    return DrawnSurface(LUMEN, colon.mesh(), noted, truth, LumenViews(colon, at))
 
 
 def _polyps(ranges: Polyps, colon: Colon, at: float, rng: np.random.Generator) -> tuple[Polyp, ...]:
     """Place polyps ahead of the camera; one that finds no free place is left out."""
-    placed: list[Polyp] = []
+    poses: list[Polyp] = []
     for _ in range(ranges.count.draw(rng)):
         for _ in range(POLYP_TRIES):
             diameter = min(ranges.diameter.draw(rng), LARGEST_POLYP * colon.radius)
@@ -99,10 +100,10 @@ def _polyps(ranges: Polyps, colon: Colon, at: float, rng: np.random.Generator) -
                 diameter=diameter,
                 height=flatness * diameter,
             )
-            if new.along < colon.length and all(_apart(new, old, colon.radius) for old in placed):
-                placed.append(new)
+            if new.along < colon.length and all(_apart(new, old, colon.radius) for old in poses):
+                poses.append(new)
                 break
-    return tuple(placed)
+    return tuple(poses)
 
 
 def _apart(a: Polyp, b: Polyp, radius: float) -> bool:

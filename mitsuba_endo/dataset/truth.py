@@ -1,17 +1,18 @@
 """Everything that is true of a sample, as images."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.creases import with_creases
 from ..decode.grid_pattern import CodedGrid
-from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
-from ..geometry.transforms import RigidTransform
-from ..rendering.synthetic import Hits, MeshScene
+from ..geometry.endoscope import Endoscope
 from ..shapes.mesh import Mesh
+
+if TYPE_CHECKING:
+    from ..rendering.synthetic import Hits, MeshScene
 
 MIXED = 0.25
 """Change of the projector coordinate from pixel to pixel, in grid periods, above which a pixel
@@ -52,33 +53,33 @@ class TruthMaps:
 
 
 def truth_maps(
-    scene: MeshScene,
+    scene: "MeshScene",
     mesh: Mesh,
-    camera: CameraModel,
-    world_from_camera: RigidTransform,
-    projector: ProjectorModel,
-    projector_from_camera: RigidTransform,
+    endoscope: Endoscope,
     grid: CodedGrid,
-    hits: Hits | None = None,
+    hits: "Hits | None" = None,
 ) -> TruthMaps:
     """Compute the truth of one view with one ray through every pixel's centre.
 
     ``hits`` are the places where these rays meet the mesh, if they are known already.
     """
+    camera, world_from_camera = endoscope.camera, endoscope.world_from_camera
     shape = camera.height, camera.width
-    ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
+    rays = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
     if hits is None:
         hits = scene.through_pixels(camera, world_from_camera)
     points = world_from_camera.inverse().apply(hits.points)
-    q = np.where(hits.hit[:, None], projector.project(projector_from_camera.apply(points)), np.nan)
-    light = (world_from_camera @ projector_from_camera.inverse()).t
+    q = endoscope.projector.project(endoscope.projector_from_camera.apply(points))
+    q = np.where(hits.hit[:, None], q, np.nan)
+    light = endoscope.world_from_projector.t
     size = np.array([grid.width, grid.height])
     with np.errstate(invalid="ignore"):
         inside = ((q >= -0.5) & (q <= size - 0.5)).all(1)
-    lit = inside & _same_side(hits, ways, light) & scene.reaches(light, hits.points)
+    lit = inside & _same_side(hits, rays, light) & scene.reaches(light, hits.points)
     truth = grid.truth(q)
-    normals = world_from_camera.inverse().rotate(_normals(mesh, hits, ways))
+    normals = world_from_camera.inverse().rotate(_normals(mesh, hits, rays))
     q_image, visible = q.reshape(*shape, 2), lit.reshape(shape)
+    q_lit = np.where(visible[..., None], q_image, np.nan)
     return TruthMaps(
         q=q_image.astype(np.float32),
         phase=truth.phase.reshape(*shape, 2).astype(np.float32),
@@ -89,19 +90,19 @@ def truth_maps(
         visible=visible,
         shadow=(inside & ~lit).reshape(shape),
         camera=hits.hit.reshape(shape),
-        mixed=visible & _jumps(np.where(visible[..., None], q_image, np.nan), grid.period),
+        mixed=visible & (largest_step(q_lit) > MIXED * grid.period),
     )
 
 
-def _same_side(hits: Hits, ways: Array, light: Array) -> NDArray[np.bool_]:
+def _same_side(hits: "Hits", rays: Array, light: Array) -> NDArray[np.bool_]:
     """Tell where the projector is on the side of the face that the camera sees."""
-    to_camera = -np.einsum("ni,ni->n", hits.normals, ways)
+    to_camera = -np.einsum("ni,ni->n", hits.normals, rays)
     to_light = np.einsum("ni,ni->n", hits.normals, light - hits.points)
     with np.errstate(invalid="ignore"):
         return to_camera * to_light > 0
 
 
-def _normals(mesh: Mesh, hits: Hits, ways: Array) -> Array:
+def _normals(mesh: Mesh, hits: "Hits", rays: Array) -> Array:
     """Return (N, 3) unit normals in the world, as the photograph is shaded; NaN without hit."""
     shaded = Mesh(*with_creases(mesh))
     corners = shaded.faces[hits.triangle]
@@ -110,11 +111,12 @@ def _normals(mesh: Mesh, hits: Hits, ways: Array) -> Array:
     square = np.einsum("ni,ni->n", face, face)
     v = np.einsum("ni,ni->n", np.cross(rest, c - a), face) / square
     w = np.einsum("ni,ni->n", np.cross(b - a, rest), face) / square
-    smooth = vertex_normals(_around(shaded, corners))
+    # Weighted by the faces' angles, as Mitsuba does.
+    smooth = np.asarray(_around(shaded, corners).to_trimesh().vertex_normals)
     na, nb, nc = (smooth[corners[:, i]] for i in range(3))
     normal = na + v[:, None] * (nb - na) + w[:, None] * (nc - na)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    towards = np.where(np.einsum("ni,ni->n", normal, ways) > 0, -1.0, 1.0)
+    towards = np.where(np.einsum("ni,ni->n", normal, rays) > 0, -1.0, 1.0)
     return np.where(hits.hit[:, None], normal * towards[:, None], np.nan)
 
 
@@ -125,31 +127,13 @@ def _around(mesh: Mesh, corners: NDArray[np.int64]) -> Mesh:
     return Mesh(mesh.vertices, mesh.faces[wanted[mesh.faces].any(1)])
 
 
-def vertex_normals(mesh: Mesh) -> Array:
-    """Return (V, 3) unit normals: the mean of the faces' ones, weighted by their angles there."""
-    corners = mesh.vertices[mesh.faces]
-    sides = np.roll(corners, -1, axis=1) - corners
-    sides /= np.linalg.norm(sides, axis=2, keepdims=True)
-    face = np.cross(sides[:, 0], sides[:, 1])
-    face /= np.linalg.norm(face, axis=1, keepdims=True)
-    cosine = -np.einsum("fki,fki->fk", sides, np.roll(sides, 1, axis=1))
-    weight = np.arccos(np.clip(cosine, -1, 1)).ravel()
-    index = mesh.faces.ravel()
-    total = np.stack([
-        np.bincount(index, weight * np.repeat(face[:, i], 3), len(mesh.vertices)) for i in range(3)
-    ], 1)  # fmt: skip
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return total / np.where(length > 0, length, 1)
-
-
-def _jumps(q: Array, period: float) -> NDArray[np.bool_]:
-    """Tell where q (H, W, 2) differs much from a neighbour on the right, left, above or below."""
-    mixed = np.zeros(q.shape[:2], bool)
-    for axis in (0, 1):
-        step = np.abs(np.diff(q, axis=axis)).max(-1)
-        wide = ~(step <= MIXED * period)
-        before, after = [slice(None)] * 2, [slice(None)] * 2
-        before[axis], after[axis] = slice(None, -1), slice(1, None)
-        mixed[tuple(before)] |= wide
-        mixed[tuple(after)] |= wide
-    return mixed
+def largest_step(q: Array) -> Array:
+    """Return the largest change (H, W) to any of the four neighbours; infinite beside NaN."""
+    step = np.zeros(q.shape[:2])
+    across = np.nan_to_num(np.abs(np.diff(q, axis=1)).max(-1), nan=np.inf)
+    down = np.nan_to_num(np.abs(np.diff(q, axis=0)).max(-1), nan=np.inf)
+    step[:, 1:] = across
+    step[:, :-1] = np.maximum(step[:, :-1], across)
+    step[1:] = np.maximum(step[1:], down)
+    step[:-1] = np.maximum(step[:-1], down)
+    return step

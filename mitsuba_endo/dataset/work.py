@@ -9,20 +9,21 @@ from typing import Literal
 
 from .. import backend
 from ..errors import InputError
+from .asset_cache import AssetCache
 from .config import Config
+from .contents import Store
 from .folder_store import FolderStore
 from .sample import make_sample
 from .shard_store import ShardStore
-from .stored import Store
-from .workshop import Workshop
 
-WORKSHOP = ".workshop"
+ASSETS = ".workshop"
+"""Folder of what samples share, while a run lasts."""
 VARIANT = "llvm_ad_rgb"
 """A GPU adds light in another order at each run, so that samples would never be the same twice."""
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class DatasetJob:
     """What is to be made, and where; sent to every worker."""
 
     config: Config
@@ -35,9 +36,9 @@ class Job:
             return ShardStore(self.out, self.config.shard)
         return FolderStore(self.out)
 
-    def workshop(self) -> Path:
+    def assets(self) -> Path:
         """Return the folder of what samples share, which is removed at the end."""
-        return Path(self.out) / WORKSHOP
+        return Path(self.out) / ASSETS
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,12 @@ def prepare() -> None:
     cv2.setNumThreads(1)
 
 
-def produce(job: Job, index: int) -> Result:
+def produce(job: DatasetJob, index: int) -> Result:
     """Make a sample and store it; whatever goes wrong with it becomes part of the result."""
     started = time.perf_counter()
     store = job.config.store
     try:
-        sample = make_sample(job.config, index, _workshop(job))
+        sample = make_sample(job.config, index, _asset_cache(job))
         job.store().write(sample, store.radiance, store.surface)
     except InputError as error:
         status = "stop" if isinstance(error.__cause__, OSError) else "failed"
@@ -87,5 +88,5 @@ def produce(job: Job, index: int) -> Result:
 
 
 @lru_cache(maxsize=1)
-def _workshop(job: Job) -> Workshop:
-    return Workshop(job.config, job.workshop())
+def _asset_cache(job: DatasetJob) -> AssetCache:
+    return AssetCache(job.config, job.assets())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..files import atomic_folder
 from ..folder_mark import Kind
-from .scenes import random_kind, random_placement, random_surface
+from .scenes import random_endoscope, random_kind, random_surface
 from .views import SUPERSAMPLE, UNLIT, View, make_view
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MINIMUM_LIT = 0.25
 """Share of the samples that the projector must reach; views with less are drawn again."""
 TRIES = 20
+"""Endoscopes drawn before the last one is taken as it is."""
 
 
 @dataclass(frozen=True)
@@ -113,11 +114,11 @@ def _fill(folder: Path, settings: CacheSettings, tick: Callable[[int], None]) ->
 def _lit_view(
     scene: "MeshScene", kind: str, settings: CacheSettings, rng: np.random.Generator
 ) -> View:
-    """Draw placements until the projector reaches enough of what the camera sees."""
+    """Draw endoscopes until the projector reaches enough of what the camera sees."""
     view = None
     for _ in range(TRIES):
-        placement = random_placement(kind, (settings.width, settings.height), SUPERSAMPLE, rng)
-        view = make_view(scene, placement)
+        endoscope = random_endoscope(kind, (settings.width, settings.height), SUPERSAMPLE, rng)
+        view = make_view(scene, endoscope)
         if (view.lattice[..., 0] != UNLIT).mean() > MINIMUM_LIT:
             break
     assert view is not None

@@ -29,11 +29,13 @@ HARSH = 0.4
 """Share of images underexposed and full of speckle: few are both by chance."""
 NEAR_NODE = 0.3
 """Periods, per axis, within which the node's code is asked for."""
+BETWEEN_PX = 61
+"""Side of the square over which light from wall to wall is spread, pixels: several periods."""
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
-    """What the network should say, per pixel."""
+class Targets:
+    """What the network should give, per pixel."""
 
     lattice: NDArray[np.float32]
     """(2, H, W) column and row; 0 where not ``lit``."""
@@ -46,7 +48,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Look:
+class Appearance:
     """Surface and light of one image; all that the camera itself does is in Effects."""
 
     scatter: float
@@ -65,10 +67,10 @@ class Look:
     """Red and blue of the tissue relative to its green, for colour images."""
 
 
-def random_look(rng: np.random.Generator) -> Look:
-    """Draw how tissue and lamp look."""
+def random_appearance(rng: np.random.Generator) -> Appearance:
+    """Draw tissue and lamp."""
     u, soft = rng.uniform, rng.random() < 0.75
-    return Look(
+    return Appearance(
         scatter=u(0.5, 1) if soft else 0.0,
         free_path=float(np.exp(u(np.log(0.5), np.log(4)))),
         reflectance=u(0.2, 0.6),
@@ -129,38 +131,42 @@ def crop_view(view: View, size: int, rng: np.random.Generator) -> View:
 
 
 def compose(
-    view: View, grid: GridTexture, look: Look, effects: Effects, rng: np.random.Generator
-) -> tuple[NDArray[np.integer], Truth]:
-    """Return the photograph (H, W), 8 or 16 bit, of a view under a grid, and its truth."""
+    view: View,
+    grid: GridTexture,
+    appearance: Appearance,
+    effects: Effects,
+    rng: np.random.Generator,
+) -> tuple[NDArray[np.integer], Targets]:
+    """Return the photograph (H, W), 8 or 16 bit, of a view under a grid, and its targets."""
     fine = _lattice(view, grid, rng)
     h, w = view.flags.shape
     pattern = cv2.resize(grid.at(fine), (w, h), interpolation=cv2.INTER_AREA)
     shading = view.shading.astype(np.float32)
     tissue = albedo((h, w), rng)
     strength = tissue * shading[..., 0]
-    laser = _scattered(pattern * strength, shading, look)
-    lamp = look.lamp * tissue * shading[..., 1]
+    laser = _scattered(pattern * strength, shading, appearance)
+    lamp = appearance.lamp * tissue * shading[..., 1]
     wet = np.zeros((h, w), np.float32)
-    if look.wet:
-        shine = look.wet * highlights(shading[..., 2], rng)
+    if appearance.wet:
+        shine = appearance.wet * highlights(shading[..., 2], rng)
         laser = (laser * (1 + shine * rng.uniform(0, 1))).astype(np.float32)
         wet = (shine * shading[..., 1] * rng.uniform(0.1, 1)).astype(np.float32)
     # The camera exposes for the pattern, or for the brightest of all.
     metered = laser if rng.random() < 0.6 else laser + lamp + wet
     gain = effects.exposure / max(float(np.percentile(metered[::2, ::2], 99.5)), 1e-6)
-    image = _photograph(laser, lamp, wet, look, effects, gain, int(rng.integers(1 << 30)))
-    return image, _truth(fine, strength * np.float32(gain) > VISIBLE, view.flags, grid)
+    image = _photograph(laser, lamp, wet, appearance, effects, gain, int(rng.integers(1 << 30)))
+    return image, _targets(fine, strength * np.float32(gain) > VISIBLE, view.flags, grid)
 
 
 def _photograph(
-    laser: NDArray[np.float32], lamp: NDArray[np.float32], wet: NDArray[np.float32], look: Look,
-    effects: Effects, gain: float, seed: int,
+    laser: NDArray[np.float32], lamp: NDArray[np.float32], wet: NDArray[np.float32],
+    appearance: Appearance, effects: Effects, gain: float, seed: int,
 ) -> NDArray[np.integer]:  # fmt: skip
     """Return the camera's image of the laser's, the tissue's and the wet film's light."""
     effects = effects.model_copy(update={"auto_exposure": False, "exposure": gain})
     if effects.colour == "gray":
         return apply_effects(laser + lamp + wet, effects, seed, laser=laser)
-    tint = np.array([look.tint[0], 1, look.tint[1]], np.float32)
+    tint = np.array([appearance.tint[0], 1, appearance.tint[1]], np.float32)
     laser_rgb = laser[..., None] * np.array(COLOURS["green"], np.float32)
     radiance = laser_rgb + lamp[..., None] * tint + wet[..., None]
     return apply_effects(radiance, effects, seed, laser=laser_rgb)
@@ -177,16 +183,16 @@ def _lattice(view: View, grid: GridTexture, rng: np.random.Generator) -> NDArray
 
 
 def _scattered(
-    light: NDArray[np.float32], shading: NDArray[np.float32], look: Look
+    light: NDArray[np.float32], shading: NDArray[np.float32], appearance: Appearance
 ) -> NDArray[np.float32]:
     """Spread the laser's light inside the tissue and from wall to wall."""
-    if look.scatter:
+    if appearance.scatter:
         # The lamp's light falls with the squared distance.
         nearness = np.sqrt(shading[..., 1] / np.maximum(shading[..., 2], LEAST_FACING))
-        inside = spread(light, nearness, look.free_path, look.reflectance)
-        light = _sum(light, 1 - look.scatter, inside, look.scatter)
-    if look.between:
-        light = _sum(light, 1, cv2.blur(light, (61, 61)), look.between)
+        inside = spread(light, nearness, appearance.free_path, appearance.reflectance)
+        light = _sum(light, 1 - appearance.scatter, inside, appearance.scatter)
+    if appearance.between:
+        light = _sum(light, 1, cv2.blur(light, (BETWEEN_PX, BETWEEN_PX)), appearance.between)
     return light
 
 
@@ -196,10 +202,10 @@ def _sum(
     return np.asarray(cv2.addWeighted(a, of_a, b, of_b, 0), np.float32)
 
 
-def _truth(
+def _targets(
     fine: NDArray[np.float32], visible: NDArray[np.bool_], flags: NDArray[np.uint8],
     grid: GridTexture,
-) -> Truth:  # fmt: skip
+) -> Targets:  # fmt: skip
     n = SUPERSAMPLE
     corners = [fine[i::n, j::n] for i in range(n) for j in range(n)]
     lattice = sum(corners[1:], corners[0]) / np.float32(n * n)
@@ -210,7 +216,7 @@ def _truth(
     near = lit & (np.abs(lattice - node) < NEAR_NODE).all(-1)
     code = 1 - grid.code[np.where(inside, node[..., 1], 0), np.where(inside, node[..., 0], 0)]
     edge = cv2.dilate(((flags & BIT_EDGE) > 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return Truth(
+    return Targets(
         lattice=np.where(lit[..., None], lattice, 0).astype(np.float32).transpose(2, 0, 1),
         lit=lit,
         code=np.where(near, code, -1).astype(np.int8),
@@ -218,8 +224,8 @@ def _truth(
     )
 
 
-def nothing(shape: tuple[int, int]) -> Truth:
-    """Return the truth of an image without a grid."""
+def no_targets(shape: tuple[int, int]) -> Targets:
+    """Return the targets of an image without a grid."""
     h, w = shape
     no = np.zeros(shape, bool)
-    return Truth(np.zeros((2, h, w), np.float32), no, np.full(shape, -1, np.int8), no)
+    return Targets(np.zeros((2, h, w), np.float32), no, np.full(shape, -1, np.int8), no)

@@ -12,7 +12,14 @@ from torch.utils.data import Dataset  # pyright: ignore[reportMissingImports]
 from ..capture.effects import apply_effects
 from ..decode.normalise import normalise
 from .cache import ViewCache
-from .compose import Truth, compose, crop_view, nothing, random_effects, random_look
+from .compose import (
+    Targets,
+    compose,
+    crop_view,
+    no_targets,
+    random_appearance,
+    random_effects,
+)
 from .patterns import grid_texture
 from .textures import without_pattern
 
@@ -37,14 +44,14 @@ class Example(TypedDict):
     """(H, W) bool."""
 
 
-def example(image: NDArray[np.integer], truth: Truth) -> Example:
-    """Join a photograph and its truth."""
+def example(image: NDArray[np.integer], targets: Targets) -> Example:
+    """Join a photograph and its targets."""
     return {
         "image": torch.from_numpy(normalise(image)),
-        "lattice": torch.from_numpy(truth.lattice),
-        "lit": torch.from_numpy(truth.lit),
-        "code": torch.from_numpy(truth.code),
-        "edge": torch.from_numpy(truth.edge),
+        "lattice": torch.from_numpy(targets.lattice),
+        "lit": torch.from_numpy(targets.lit),
+        "code": torch.from_numpy(targets.code),
+        "edge": torch.from_numpy(targets.edge),
     }
 
 
@@ -69,10 +76,10 @@ class TrainingExamples(Dataset[Example]):
         view = crop_view(self.views.view(int(rng.integers(len(self.views)))), self.size, rng)
         grid = grid_texture(int(rng.integers(PATTERNS)))
         grid = grid.turned() if rng.random() < 0.5 else grid
-        return example(*compose(view, grid, random_look(rng), random_effects(rng), rng))
+        return example(*compose(view, grid, random_appearance(rng), random_effects(rng), rng))
 
     def _negative(self, rng: np.random.Generator) -> Example:
         shape = (self.size, self.size)
         picture = without_pattern(shape, rng)
         image = apply_effects(picture, random_effects(rng), int(rng.integers(1 << 30)))
-        return example(image, nothing(shape))
+        return example(image, no_targets(shape))

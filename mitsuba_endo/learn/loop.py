@@ -9,11 +9,12 @@ from typing import cast
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 from numpy.typing import NDArray
+from torch import Tensor  # pyright: ignore[reportMissingImports]
+from torch.optim.swa_utils import AveragedModel  # pyright: ignore[reportMissingImports]
 from torch.utils.data import DataLoader  # pyright: ignore[reportMissingImports]
 
 from ..errors import InputError
 from ..files import atomic_path
-from .averaging import Average
 from .cache import ViewCache
 from .curves import Row, rows, save_curves, save_table
 from .examples import Example, TrainingExamples
@@ -23,13 +24,13 @@ from .model import DecoderNet
 from .validation import ValidationImage, evaluate
 
 DECAY = 0.995
-"""Of the averaged weights, per step."""
+"""Of the averaged weights, per step; less in the first steps, with the network still far away."""
 CLIP = 5.0
 """Largest norm of the gradient."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class TrainingPlan:
     """How to train. Give ``steps`` for a result that repeats to the bit, or ``minutes``."""
 
     minutes: float | None = None
@@ -58,7 +59,8 @@ class Plan:
 @dataclass
 class _State:
     network: torch.nn.Module
-    average: Average
+    average: AveragedModel
+    """The exponential moving average of the network, which is what is shipped."""
     optimizer: torch.optim.Optimizer
     step: int = 0
     seconds: float = 0.0
@@ -66,11 +68,11 @@ class _State:
 
 
 def train(
-    plan: Plan,
+    plan: TrainingPlan,
     views: ViewCache,
     validation: list[ValidationImage],
     out: Path,
-    say: Callable[[str], None] = print,
+    log: Callable[[str], None] = print,
 ) -> Path:
     """Train, or go on with the training in ``out``; return the exported network's path.
 
@@ -92,33 +94,41 @@ def train(
         recent.append(_step(state, batch, _rate(plan, state.step, progress), device))
         state.seconds = time.monotonic() - began
         if state.step % plan.epoch == 0:
-            _report(state, plan, validation, float(np.mean(recent)), out, device, say)
+            _report(state, plan, validation, float(np.mean(recent)), out, device, log)
             recent.clear()
     if recent:
         state.seconds = time.monotonic() - began
-        _report(state, plan, validation, float(np.mean(recent)), out, device, say)
+        _report(state, plan, validation, float(np.mean(recent)), out, device, log)
     return out / "decoder.onnx"
 
 
-def _start(plan: Plan, out: Path, device: torch.device) -> _State:
+def _start(plan: TrainingPlan, out: Path, device: torch.device) -> _State:
     network = DecoderNet().to(device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue]
     optimizer = torch.optim.AdamW(network.parameters(), plan.rate, weight_decay=plan.decay)
-    state = _State(network, Average(network, DECAY), optimizer)
+    state = _State(network, AveragedModel(network, avg_fn=_average, use_buffers=True), optimizer)
     path = out / "training.pt"
     if path.is_file():
         saved = torch.load(path, map_location=device, weights_only=True)
         try:
             network.load_state_dict(saved["network"])
-            state.average.network.load_state_dict(saved["average"])
+            state.average.module.load_state_dict(saved["average"])
             optimizer.load_state_dict(saved["optimizer"])
         except (KeyError, RuntimeError, ValueError) as error:
             raise InputError("is of another network", str(path), "remove it") from error
         state.step, state.seconds = saved["step"], saved["seconds"]
         state.history = saved["history"]
+    # The network that the average starts as counts as the first.
+    state.average.n_averaged.fill_(1 + state.step)
     return state
 
 
-def _batches(plan: Plan, views: ViewCache, step: int) -> Iterator[Example]:
+def _average(mine: Tensor, theirs: Tensor, step: Tensor | int) -> Tensor:
+    """Return one weight or buffer of the average after ``step`` steps; counters are copied."""
+    decay = min(DECAY, (1 + int(step)) / (10 + int(step)))
+    return torch.lerp(mine, theirs, 1 - decay) if mine.dtype.is_floating_point else theirs
+
+
+def _batches(plan: TrainingPlan, views: ViewCache, step: int) -> Iterator[Example]:
     """Yield the batches that follow the first ``step`` ones."""
     left = 10**7 if plan.steps is None else max(plan.steps - step, 0) * plan.batch
     if left == 0:
@@ -139,14 +149,14 @@ def _one_thread(_: int) -> None:
     torch.set_num_threads(1)
 
 
-def _progress(plan: Plan, step: int, seconds: float) -> float:
+def _progress(plan: TrainingPlan, step: int, seconds: float) -> float:
     if plan.steps is not None:
         return step / plan.steps
     assert plan.minutes is not None
     return seconds / (60 * plan.minutes)
 
 
-def _rate(plan: Plan, step: int, progress: float) -> float:
+def _rate(plan: TrainingPlan, step: int, progress: float) -> float:
     rise = min(1.0, (step + 1) / plan.warm_up)
     return plan.rate * rise * 0.5 * (1 + float(np.cos(np.pi * progress)))
 
@@ -167,29 +177,29 @@ def _step(state: _State, batch: Example, rate: float, device: torch.device) -> f
     torch.nn.utils.clip_grad_norm_(state.network.parameters(), CLIP)
     state.optimizer.step()
     state.step += 1
-    state.average.follow(state.network, state.step)
+    state.average.update_parameters(state.network)
     return float(loss.detach())
 
 
-def _report(state: _State, plan: Plan, validation: list[ValidationImage], loss: float, out: Path,
-            device: torch.device, say: Callable[[str], None]) -> None:  # fmt: skip
+def _report(state: _State, plan: TrainingPlan, validation: list[ValidationImage], loss: float,
+            out: Path, device: torch.device, log: Callable[[str], None]) -> None:  # fmt: skip
     """Validate, and save all that a later run or a reader needs."""
     epoch, minutes = len({row["step"] for row in state.history}) + 1, state.seconds / 60
-    scores = evaluate(validation, _runner(state.average.network, device))
+    scores = evaluate(validation, _runner(state.average.module.eval(), device))
     state.history += rows(epoch, state.step, minutes, loss, scores)
     with atomic_path(out / "training.pt") as aside:
         torch.save({
-            "network": state.network.state_dict(), "average": state.average.network.state_dict(),
+            "network": state.network.state_dict(), "average": state.average.module.state_dict(),
             "optimizer": state.optimizer.state_dict(), "step": state.step,
             "seconds": state.seconds, "history": state.history,
         }, aside)  # fmt: skip
     notes = {"steps": str(state.step), "seed": str(plan.seed)}
-    export_onnx(state.average.network, out / "decoder.onnx", notes)
+    export_onnx(state.average.module, out / "decoder.onnx", notes)
     save_table(out / "metrics.csv", state.history)
     save_curves(out / "curves.png", state.history)
-    say(f"step {state.step}, {minutes:.1f} min, loss {loss:.3f}")
+    log(f"step {state.step}, {minutes:.1f} min, loss {loss:.3f}")
     for name, m in scores.items():
-        say(f"  {name:13} median {m.median:.4f}  p95 {m.p95:.4f}  gross {m.gross:.4f}"
+        log(f"  {name:13} median {m.median:.4f}  p95 {m.p95:.4f}  gross {m.gross:.4f}"
             f"  coverage {m.coverage:.3f}  codes {m.code_right:.4f}  false {m.false_share:.3f}"
             f"  edges {m.edge_recall:.2f}/{m.edge_precision:.2f}")  # fmt: skip
 

@@ -30,10 +30,10 @@ class GridTexture:
 
     def at(self, lattice: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the light (H, W) at column and row (H, W, 2); dark outside and at NaN."""
-        place = (lattice + np.float32(MARGIN)) * np.float32(TEXELS) - np.float32(0.5)
-        place = np.nan_to_num(place, nan=-100.0)
+        texel = (lattice + np.float32(MARGIN)) * np.float32(TEXELS) - np.float32(0.5)
+        texel = np.nan_to_num(texel, nan=-100.0)
         light = np.ascontiguousarray(self.light)
-        x, y = place[..., 0], place[..., 1]
+        x, y = texel[..., 0], texel[..., 1]
         return np.asarray(cv2.remap(light, x, y, cv2.INTER_LINEAR, borderValue=(0.0,)), np.float32)
 
 

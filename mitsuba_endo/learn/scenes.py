@@ -3,14 +3,12 @@
 The rabbit is never drawn: it is kept for tests.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.endoscope import Endoscope, aimed_projector
+from ..geometry.laws import projector_model
 from ..geometry.transforms import RigidTransform
 from ..shapes import Mesh, make_shape
 
@@ -20,18 +18,6 @@ KINDS = {
 }  # fmt: skip
 """Share of each kind of surface. ``tube`` is a colon of extreme folds seen from close by,
 ``occluders`` a sheet with balls before it: both are there for their depth edges."""
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """An endoscope in the world."""
-
-    camera: CameraModel
-    world_from_camera: RigidTransform
-    projector: ProjectorModel
-    """Its focal length is in grid periods and its centre is 0: q are lattice coordinates that
-    count from the pattern's middle."""
-    projector_from_camera: RigidTransform
 
 
 def random_kind(rng: np.random.Generator) -> str:
@@ -92,17 +78,20 @@ def _with_balls(sheet: Mesh, rng: np.random.Generator) -> Mesh:
                           angle_x=1.45, angle_y=1.45, edge=0.7)  # fmt: skip
         # Turned round: the back of the bowl about the origin is the front of a ball.
         turned = ball.vertices * [1, -1, -1]
-        place = np.array([*rng.uniform(-22, 22, 2), rng.uniform(38, 60)])
-        parts.append((turned + place, ball.faces))
+        centre = np.array([*rng.uniform(-22, 22, 2), rng.uniform(38, 60)])
+        parts.append((turned + centre, ball.faces))
     offsets = np.cumsum([0] + [len(v) for v, _ in parts[:-1]])
     faces = np.concatenate([f + o for (_, f), o in zip(parts, offsets, strict=True)])
     return Mesh(np.concatenate([v for v, _ in parts]), faces)
 
 
-def random_placement(
+def random_endoscope(
     kind: str, size: tuple[int, int], supersample: int, rng: np.random.Generator
-) -> Placement:
+) -> Endoscope:
     """Return an endoscope before a surface of ``kind``.
+
+    The projector's focal length is in grid periods and its centre is 0: q are lattice coordinates
+    that count from the pattern's middle.
 
     Args:
         kind: of the surface.
@@ -115,7 +104,7 @@ def random_placement(
     focal = float(camera.K[0, 0]) / supersample / period_px
     law = str(rng.choice(["pinhole", "direction_cosine"]))
     projector = projector_model(law, focal, (0.0, 0.0), aspect=rng.uniform(0.98, 1.02))
-    return Placement(camera, _camera_pose(kind, rng), projector, _projector_pose(rng))
+    return Endoscope(camera, _camera_pose(kind, rng), projector, _projector_pose(rng))
 
 
 def _camera(size: tuple[int, int], supersample: int, rng: np.random.Generator) -> CameraModel:
@@ -135,31 +124,21 @@ def _camera_pose(kind: str, rng: np.random.Generator) -> RigidTransform:
     u = rng.uniform
     tube = kind in ("colon", "tube")
     if tube:
-        place = [*u(-5, 5, 2), u(0, 32)]
+        centre = [*u(-5, 5, 2), u(0, 32)]
         tilt = 0.75 if rng.random() < 0.35 else 0.25
     else:
-        place = [*u(-9, 9, 2), u(-8, 28)]
+        centre = [*u(-9, 9, 2), u(-8, 28)]
         tilt = 0.55 if kind == "plane" else 0.35
     roll = Rotation.from_rotvec([0, 0, u(-np.pi, np.pi)])
     lean = Rotation.from_rotvec([*u(-tilt, tilt, 2), 0])
-    return RigidTransform((lean * roll).as_matrix(), np.array(place))
+    return RigidTransform((lean * roll).as_matrix(), np.array(centre))
 
 
 def _projector_pose(rng: np.random.Generator) -> RigidTransform:
     """Aim a projector a few millimetres beside the camera at what the camera looks at."""
     u = rng.uniform
     around, baseline = u(0, 2 * np.pi), u(2.5, 9)
-    place = np.array([baseline * np.cos(around), baseline * np.sin(around), u(-3, 3)])
+    centre = np.array([baseline * np.cos(around), baseline * np.sin(around), u(-3, 3)])
     target = np.array([*rng.normal(0, 3, 2), u(35, 90)])
     roll = rng.normal(0, 0.12) if rng.random() < 0.7 else u(-0.6, 0.6)
-    R = Rotation.from_rotvec([0, 0, roll]).as_matrix() @ _looking(target - place)
-    return RigidTransform(R, -R @ place)
-
-
-def _looking(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the smallest rotation (3, 3) that takes ``direction`` to +z."""
-    d = direction / np.linalg.norm(direction)
-    axis = np.cross(d, [0.0, 0.0, 1.0])
-    length = np.linalg.norm(axis)
-    angle = np.arctan2(length, d[2])
-    return Rotation.from_rotvec(axis / max(length, 1e-12) * angle).as_matrix()
+    return aimed_projector(centre, target, Rotation.from_rotvec([0, 0, -roll]).as_matrix())

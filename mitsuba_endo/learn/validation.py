@@ -10,7 +10,7 @@ from ..capture.settings import Effects
 from ..decode.network import CHANNELS, read_heads
 from ..decode.normalise import normalise
 from .cache import ViewCache
-from .compose import Look, Truth, compose
+from .compose import Appearance, Targets, compose
 from .metrics import PixelMetrics, pixel_metrics
 from .patterns import grid_texture
 
@@ -26,44 +26,44 @@ class ValidationImage:
 
     scenario: str
     image: NDArray[np.float32]
-    truth: Truth
+    truth: Targets
 
 
 def validation_images(views: ViewCache) -> list[ValidationImage]:
     """Return one clean and one heavily corrupted image of each view."""
-    found = []
+    images = []
     for index, kind in enumerate(views.kinds):
         for clean in (True, False):
             rng = np.random.default_rng((UNSEEN, index, int(clean)))
-            look, effects = clean_image() if clean else heavy_image(rng)
+            appearance, effects = clean_image() if clean else heavy_image(rng)
             grid = grid_texture(UNSEEN + index)
-            image, truth = compose(views.view(index), grid, look, effects, rng)
+            image, truth = compose(views.view(index), grid, appearance, effects, rng)
             name = f"{'clean' if clean else 'heavy'} {'folded' if kind in FOLDED else 'smooth'}"
-            found.append(ValidationImage(name, normalise(image), truth))
-    return found
+            images.append(ValidationImage(name, normalise(image), truth))
+    return images
 
 
-def clean_image() -> tuple[Look, Effects]:
+def clean_image() -> tuple[Appearance, Effects]:
     """Return dry tissue, sharp and well exposed."""
-    look = Look(scatter=0.9, free_path=1.0, reflectance=0.35, between=0.05, lamp=0.05, wet=0.0,
-                tint=(2, 0.8))  # fmt: skip
+    appearance = Appearance(scatter=0.9, free_path=1.0, reflectance=0.35, between=0.05, lamp=0.05,
+                            wet=0.0, tint=(2, 0.8))  # fmt: skip
     effects = Effects(vignetting=0.5, defocus=0.5, speckle_contrast=0.0, exposure=1.0,
                       colour="gray", shot=20000, read_noise=4)  # fmt: skip
-    return look, effects
+    return appearance, effects
 
 
-def heavy_image(rng: np.random.Generator) -> tuple[Look, Effects]:
+def heavy_image(rng: np.random.Generator) -> tuple[Appearance, Effects]:
     """Return wet tissue with speckle contrast 0.5 to 0.8 and exposure 0.3 to 0.5."""
     u = rng.uniform
-    look = Look(scatter=u(0.7, 1), free_path=u(1, 2.5), reflectance=0.35, between=0.15,
-                lamp=u(0.05, 0.3), wet=3, tint=(2, 0.8))  # fmt: skip
+    appearance = Appearance(scatter=u(0.7, 1), free_path=u(1, 2.5), reflectance=0.35, between=0.15,
+                            lamp=u(0.05, 0.3), wet=3, tint=(2, 0.8))  # fmt: skip
     effects = Effects(
         vignetting=1.0, defocus=u(0.4, 0.8), motion=u(0, 1.5), motion_angle=u(0, 3.14),
         speckle_contrast=round(u(0.5, 0.8), 2), speckle_grain=u(1.2, 2.2), exposure=u(0.3, 0.5),
         colour="colour" if rng.random() < 0.5 else "gray", shot=6000, read_noise=12,
         gamma=float(rng.choice([1.0, 2.2])),
     )  # fmt: skip
-    return look, effects
+    return appearance, effects
 
 
 def evaluate(

@@ -7,21 +7,22 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .scenes import Placement
+from ..dataset.truth import MIXED, largest_step
+from ..geometry.endoscope import Endoscope
 
 if TYPE_CHECKING:
     from ..rendering.synthetic import MeshScene
 
 SUPERSAMPLE = 2
 """Samples of the pattern per pixel along each axis."""
-MIXED = 0.25
-"""Periods per pixel; where lattice coordinates change faster a pixel has no one truth."""
 JUMP = 0.6
 """Periods per pixel that count as a depth edge."""
 LEAST_FACING = 0.03
 """Cosine to which Lambert's law is followed: relief lights even a wall that is seen edge on."""
 LATTICE_UNIT = 1e-3
+"""Periods per unit of a stored coordinate: an eighth of the network's median error."""
 UNLIT = -32768
+"""Stored coordinate of a shadow: the least of 16 bits, its own negative."""
 BIT_MIXED, BIT_EDGE, BIT_HIT = 1, 2, 4
 
 
@@ -38,22 +39,22 @@ class View:
     """(H, W) BIT_MIXED, BIT_EDGE, BIT_HIT."""
 
 
-def make_view(scene: "MeshScene", placement: Placement) -> View:
+def make_view(scene: "MeshScene", endoscope: Endoscope) -> View:
     """Cast one view of a mesh.
 
     Args:
         scene: the mesh, in the world.
-        placement: endoscope whose camera has SUPERSAMPLE samples per pixel.
+        endoscope: endoscope whose camera has SUPERSAMPLE samples per pixel.
     """
-    seen = scene.view(placement.camera, placement.world_from_camera, placement.projector,
-                      placement.projector_from_camera)  # fmt: skip
+    view = scene.view(endoscope.camera, endoscope.world_from_camera, endoscope.projector,
+                      endoscope.projector_from_camera)  # fmt: skip
     # Also in shadow: an edge is where the surface jumps, lit or not.
-    everywhere = placement.projector.project(placement.projector_from_camera.apply(seen.points))
-    stored = np.round(seen.q / LATTICE_UNIT)
+    everywhere = endoscope.projector.project(endoscope.projector_from_camera.apply(view.points))
+    stored = np.round(view.q / LATTICE_UNIT)
     # NaN, in shadow, compares as false.
     inside = np.all(np.abs(stored) < -UNLIT, axis=-1, keepdims=True)
     lattice = np.where(inside, stored, UNLIT).astype(np.int16)
-    return View(lattice, _shading(seen.points, placement), _flags(seen.points, everywhere))
+    return View(lattice, _shading(view.points, endoscope), _flags(view.points, everywhere))
 
 
 def _flags(points: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -66,18 +67,6 @@ def _flags(points: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.ui
     return flags
 
 
-def largest_step(q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest change (H, W) to any of the four neighbours; infinite beside NaN."""
-    step = np.zeros(q.shape[:2])
-    across = np.nan_to_num(np.abs(np.diff(q, axis=1)).max(-1), nan=np.inf)
-    down = np.nan_to_num(np.abs(np.diff(q, axis=0)).max(-1), nan=np.inf)
-    step[:, 1:] = across
-    step[:, :-1] = np.maximum(step[:, :-1], across)
-    step[1:] = np.maximum(step[1:], down)
-    step[:-1] = np.maximum(step[:-1], down)
-    return step
-
-
 def _any(samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which pixels (H, W) have such a sample."""
     height, width = samples.shape
@@ -85,14 +74,14 @@ def _any(samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.logical_or.reduce(samples.reshape(height // n, n, width // n, n), axis=(1, 3))
 
 
-def _shading(points: NDArray[np.float64], placement: Placement) -> NDArray[np.float16]:
+def _shading(points: NDArray[np.float64], endoscope: Endoscope) -> NDArray[np.float16]:
     """Lambert's law and the inverse square of the distance, at pixels (H, W, 4)."""
     n = SUPERSAMPLE
-    at = np.ascontiguousarray(points[n // 2 :: n, n // 2 :: n])
-    source = placement.projector_from_camera.inverse().t
-    normal = _normals(at)
-    to_camera, distance = _unit(-at)
-    to_source, far = _unit(source - at)
+    surface = np.ascontiguousarray(points[n // 2 :: n, n // 2 :: n])
+    source = endoscope.projector_from_camera.inverse().t
+    normal = _normals(surface)
+    to_camera, distance = _unit(-surface)
+    to_source, far = _unit(source - surface)
     half, _ = _unit(to_camera + to_source)
     facing = np.einsum("hwi,hwi->hw", normal, to_camera)
     lambert = np.clip(np.einsum("hwi,hwi->hw", normal, to_source), LEAST_FACING, 1)
@@ -121,6 +110,6 @@ def _unit(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float
 
 
 def _relative(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    known = values[np.isfinite(values)]
-    top = np.percentile(known, 99) if known.size else 1.0
+    finite = values[np.isfinite(values)]
+    top = np.percentile(finite, 99) if finite.size else 1.0
     return np.minimum(values / top, 3)

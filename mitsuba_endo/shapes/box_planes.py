@@ -67,10 +67,10 @@ class BoxPlanes:
         for first in range(3):
             second = (first + 1) % 3
             rows, columns = counts[first] + 1, counts[second] + 1
-            place = np.zeros((rows, columns, 3), dtype=np.int64)
-            place[..., first] = np.arange(rows)[:, None]
-            place[..., second] = np.arange(columns)[None, :]
-            lattice.append(place.reshape(-1, 3))
+            cell = np.zeros((rows, columns, 3), dtype=np.int64)
+            cell[..., first] = np.arange(rows)[:, None]
+            cell[..., second] = np.arange(columns)[None, :]
+            lattice.append(cell.reshape(-1, 3))
             faces.append(grid_faces(rows, columns) + start)
             start += rows * columns
         unique, index = np.unique(np.concatenate(lattice), axis=0, return_inverse=True)

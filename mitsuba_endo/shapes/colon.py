@@ -20,7 +20,9 @@ from mitsuba_endo.shapes.registry import CHECKED, Finite, NonNegative, Positive,
 Array = NDArray[np.float64]
 
 TENIAE = 3
+"""Bands of muscle along a colon (anatomy)."""
 POLYP_REFINEMENT = 2.5
+"""How much closer vertices lie at a polyp than elsewhere."""
 ALONG = 0.7
 """Cells are shorter along the tube and longer around it: folds are curved along it."""
 

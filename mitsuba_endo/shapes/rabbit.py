@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 LOW, HIGH = np.array([-28.0, -2.5, -20.0]), np.array([27.0, 67.0, 20.0])
 MIDDLE = np.array([0.0, 32.0, 0.0])
 UNITS_HIGH = 66.0
+"""From the feet to the tips of the ears, in the figure's units."""
 
 
 @register("rabbit")

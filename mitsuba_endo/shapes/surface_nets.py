@@ -60,7 +60,7 @@ def _close_pinches(values: Array, rounds: int = 8) -> None:
     would share an edge.
     """
     for _ in range(rounds):
-        found = False
+        mended = False
         for u, v in ((0, 1), (0, 2), (1, 2)):
             corners = []
             for du, dv in ((0, 0), (1, 0), (1, 1), (0, 1)):
@@ -69,18 +69,18 @@ def _close_pinches(values: Array, rounds: int = 8) -> None:
                 pick[v] = slice(dv, values.shape[v] - 1 + dv)
                 corners.append(values[tuple(pick)])
             a, b, c, d = (corner < 0 for corner in corners)
-            at = np.argwhere((a == c) & (b == d) & (a != b))
-            found = found or len(at) > 0
-            for place in at:
+            saddles = np.argwhere((a == c) & (b == d) & (a != b))
+            mended = mended or len(saddles) > 0
+            for saddle in saddles:
                 steps = np.zeros((4, 3), dtype=int)
                 steps[[1, 2], u] = 1
                 steps[[2, 3], v] = 1
-                ring = [tuple(place + step) for step in steps]
+                ring = [tuple(saddle + step) for step in steps]
                 outside = [corner for corner in ring if values[corner] >= 0]
                 if outside:
                     nearest = min(outside, key=lambda corner: values[corner])
                     values[nearest] = min(-values[nearest], -1e-6)
-        if not found:
+        if not mended:
             return
 
 
@@ -115,7 +115,7 @@ def _cell_points(values: Array, inside: NDArray[np.bool_]) -> tuple[Array, Index
 
 def _quads(inside: NDArray[np.bool_], index: Index) -> Index:
     """Return (Q, 4) vertex indices around every crossed grid edge, outward by the right hand."""
-    found = []
+    parts = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         order = (axis, u, v)
@@ -127,8 +127,8 @@ def _quads(inside: NDArray[np.bool_], index: Index) -> Index:
         ring = [at[:, :-1, :-1], at[:, 1:, :-1], at[:, 1:, 1:], at[:, :-1, 1:]]
         quads = np.stack([part[crossed] for part in ring], axis=1)
         leaving = first[crossed]  # inside to outside along +axis: the ring is counter-clockwise
-        found.append(np.where(leaving[:, None], quads, quads[:, ::-1]))
-    return np.concatenate(found)
+        parts.append(np.where(leaving[:, None], quads, quads[:, ::-1]))
+    return np.concatenate(parts)
 
 
 def _check_closed(quads: Index, count: int) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from mitsuba_endo.dataset.config import Config
 from mitsuba_endo.dataset.local_pool import LocalPool
 from mitsuba_endo.dataset.run import Progress, make_dataset
-from mitsuba_endo.dataset.work import Job, Result, prepare, produce
+from mitsuba_endo.dataset.work import DatasetJob, Result, prepare, produce
 
 from .report import Figure, timed
 
@@ -78,7 +78,7 @@ def _memory(notes: list[dict[str, float]], quick: bool) -> list[Figure]:
 
 
 def _make(config: Config, out: Path, count: int) -> Progress:
-    def pool(job: Job) -> LocalPool:
+    def pool(job: DatasetJob) -> LocalPool:
         return LocalPool(job, WORKERS, prepare_stopwatch, produce_noted, recycle=10**9)
 
     return make_dataset(config, out, count, pool)
@@ -102,7 +102,7 @@ def prepare_stopwatch() -> None:
     mi.render = render
 
 
-def produce_noted(job: Job, index: int) -> Result:
+def produce_noted(job: DatasetJob, index: int) -> Result:
     """Make a sample; note how long it rendered and how much memory the process has."""
     before = _rendering[0]
     result = produce(job, index)

@@ -11,8 +11,8 @@ from mitsuba_endo.dataset.contact_sheet import (
     truth_picture,
     write_contact_sheets,
 )
+from mitsuba_endo.dataset.contents import Stored
 from mitsuba_endo.dataset.reader import Dataset
-from mitsuba_endo.dataset.stored import Stored
 from tests.dataset.small import make_here, small_config
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from mitsuba_endo.dataset.local_pool import LocalPool
-from mitsuba_endo.dataset.work import Job
+from mitsuba_endo.dataset.work import DatasetJob
 from tests.dataset import pool_jobs
 from tests.dataset.small import small_config
 
 
 def pool(folder: Path, produce, workers: int = 2, recycle: int = 100) -> LocalPool:
-    job = Job(small_config(), str(folder))
+    job = DatasetJob(small_config(), str(folder))
     return LocalPool(job, workers, pool_jobs.nothing, produce, recycle)
 
 

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.dataset import work
+from mitsuba_endo.dataset.asset_cache import AssetCache
 from mitsuba_endo.dataset.contents import arrays_of
 from mitsuba_endo.dataset.digests import file_digest
-from mitsuba_endo.dataset.lock import locked
 from mitsuba_endo.dataset.reader import Dataset
-from mitsuba_endo.dataset.run import failures, make_dataset
+from mitsuba_endo.dataset.run import failures, locked, make_dataset
 from mitsuba_endo.dataset.sample import make_sample
 from mitsuba_endo.dataset.work import Result, produce
-from mitsuba_endo.dataset.workshop import Workshop
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.litter import aside_of
 from tests.dataset.small import (
@@ -55,7 +54,7 @@ def test_what_is_stored_is_what_was_made(whole, tmp_path: Path):
     config, dataset = small_config(format=form), Dataset(folder)
     assert len(dataset) == 6
     with one_thread():
-        sample = make_sample(config, 2, Workshop(config, tmp_path))
+        sample = make_sample(config, 2, AssetCache(config, tmp_path))
     stored = dataset[2]
     for name, array in arrays_of(sample, radiance=True, surface=True).items():
         assert stored.arrays[name].dtype == array.dtype, name
@@ -192,10 +191,10 @@ def test_a_fault_of_the_program_in_one_sample_does_not_end_the_run(tmp_path: Pat
     """Oracle: an exception that nobody expects, in sample 0 alone."""
     real = work.make_sample
 
-    def faulty(config, index, workshop):
+    def faulty(config, index, assets):
         if index == 0:
             raise ZeroDivisionError("oh")
-        return real(config, index, workshop)
+        return real(config, index, assets)
 
     monkeypatch.setattr(work, "make_sample", faulty)
     done = make_here(small_config(), tmp_path / "out", 2)
@@ -236,7 +235,7 @@ def test_progress_counts_and_foresees(tmp_path: Path):
     assert replace(seen[1], done=2).seconds_left == pytest.approx(1 / seen[1].rate)
 
 
-def test_nothing_of_the_workshop_is_left(whole):
+def test_nothing_of_the_cache_is_left(whole):
     """Oracle: the folder's listing."""
     names = {path.name for path in whole[1].iterdir()}
     rest = {"samples"} if whole[0] == "files" else {"shards"}

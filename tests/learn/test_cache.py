@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.cameras import CameraModel
+from mitsuba_endo.geometry.endoscope import Endoscope
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.learn.cache import CacheSettings, open_cache
-from mitsuba_endo.learn.scenes import KINDS, Placement, random_placement, random_surface
+from mitsuba_endo.learn.scenes import KINDS, random_endoscope, random_surface
 from mitsuba_endo.learn.views import BIT_EDGE, BIT_HIT, LATTICE_UNIT, UNLIT, make_view
 from mitsuba_endo.shapes import make_shape
 
@@ -25,15 +26,15 @@ def test_view_of_a_plane(llvm):
     K = np.array([[70.0, 0, 38.0], [0, 72.0, 30.0], [0, 0, 1]])
     camera = CameraModel("opencv", 80, 60, K)
     own = RigidTransform.of([0.05, -0.08, 0.1], [-5.0, 1.0, 0.5])
-    place = Placement(
+    endoscope = Endoscope(
         camera, RigidTransform.identity(), projector_model("pinhole", 8.0, (0, 0)), own
     )
-    view = make_view(MeshScene(mesh.vertices, mesh.faces), place)
+    view = make_view(MeshScene(mesh.vertices, mesh.faces), endoscope)
     corners = mesh.vertices[mesh.faces[0]]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     rays = camera.rays(camera.pixel_grid())
     points = rays * ((normal @ corners[0]) / (rays @ normal))[..., None]
-    expected = place.projector.project(own.apply(points))
+    expected = endoscope.projector.project(own.apply(points))
     found = view.lattice * LATTICE_UNIT
     np.testing.assert_allclose(found, expected, atol=LATTICE_UNIT)
     assert view.flags.shape == (30, 40)
@@ -75,7 +76,7 @@ def test_every_kind_is_mostly_seen_and_lit(llvm, kind):
     rng = np.random.default_rng(11)
     mesh = random_surface(kind, rng)
     scene = MeshScene(mesh.vertices, mesh.faces)
-    views = [make_view(scene, random_placement(kind, (48, 36), 2, rng)) for _ in range(4)]
+    views = [make_view(scene, random_endoscope(kind, (48, 36), 2, rng)) for _ in range(4)]
     assert np.mean([(v.flags & BIT_HIT) > 0 for v in views]) > 0.8
     lit = np.stack([v.lattice[..., 0] != UNLIT for v in views])
     assert lit.mean() > 0.5

@@ -3,18 +3,15 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from mitsuba_endo.capture.settings import Effects
 from mitsuba_endo.decode.grid_pattern import CodedGrid
-from mitsuba_endo.learn.compose import Look, compose, crop_view
-from mitsuba_endo.learn.examples import TrainingExamples
+from mitsuba_endo.learn.compose import Appearance, compose, crop_view
 from mitsuba_endo.learn.patterns import TEXELS, grid_texture
 from mitsuba_endo.learn.textures import clouds, without_pattern
 from mitsuba_endo.learn.views import LATTICE_UNIT, UNLIT
 from tests.learn.cached import step_cache
 
-DRY = Look(scatter=0, free_path=1, reflectance=0.4, between=0, lamp=0, wet=0, tint=(2, 0.8))
+DRY = Appearance(scatter=0, free_path=1, reflectance=0.4, between=0, lamp=0, wet=0, tint=(2, 0.8))
 PLAIN = Effects(vignetting=0, defocus=0, speckle_contrast=0, shot=None, gamma=1, colour="gray",
                 bits=16)  # fmt: skip
 
@@ -130,6 +127,9 @@ def test_mirrors_keep_the_pattern_unmirrored():
 
 def test_examples_repeat_by_number():
     """Oracle: equality of every tensor; another number or seed differs."""
+    pytest.importorskip("torch")
+    from mitsuba_endo.learn.examples import TrainingExamples
+
     cache = step_cache()
     examples = TrainingExamples(cache, 64, seed=2, first=0, count=8)
     later = TrainingExamples(cache, 64, seed=2, first=5, count=3)

@@ -11,12 +11,12 @@ pytest.importorskip("onnx")
 
 from mitsuba_endo.errors import InputError  # noqa: E402
 from mitsuba_endo.learn import examples  # noqa: E402
-from mitsuba_endo.learn.loop import Plan, train  # noqa: E402
+from mitsuba_endo.learn.loop import TrainingPlan, train  # noqa: E402
 from mitsuba_endo.learn.model import DecoderNet  # noqa: E402
 from mitsuba_endo.learn.validation import validation_images  # noqa: E402
 from tests.learn.cached import step_cache  # noqa: E402
 
-PLAN = Plan(steps=4, batch=2, size=64, epoch=2, workers=0, warm_up=2, seed=5)
+PLAN = TrainingPlan(steps=4, batch=2, size=64, epoch=2, workers=0, warm_up=2, seed=5)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -44,7 +44,7 @@ def _weights(folder) -> dict:
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory, held_out):
     out = tmp_path_factory.mktemp("whole")
-    train(PLAN, step_cache(), held_out, out, say=lambda line: None)
+    train(PLAN, step_cache(), held_out, out, log=lambda line: None)
     return out
 
 
@@ -59,9 +59,9 @@ def test_a_stopped_run_goes_on(trained, held_out, tmp_path):
         raise _Stop
 
     with pytest.raises(_Stop):
-        train(PLAN, step_cache(), held_out, tmp_path, say=stop)
+        train(PLAN, step_cache(), held_out, tmp_path, log=stop)
     assert torch.load(tmp_path / "training.pt", weights_only=True)["step"] == 2
-    train(PLAN, step_cache(), held_out, tmp_path, say=lambda line: None)
+    train(PLAN, step_cache(), held_out, tmp_path, log=lambda line: None)
     for name, value in _weights(trained).items():
         torch.testing.assert_close(_weights(tmp_path)[name], value, rtol=0, atol=0)
 
@@ -90,15 +90,15 @@ def test_another_network_is_refused(held_out, tmp_path):
 
 def test_minutes_or_steps():
     with pytest.raises(InputError):
-        Plan()
+        TrainingPlan()
     with pytest.raises(InputError):
-        Plan(minutes=1, steps=1)
+        TrainingPlan(minutes=1, steps=1)
 
 
 @pytest.mark.slow
 def test_it_learns(held_out, tmp_path):
     """Oracle: a guess has a median error of a quarter period; 60 steps must do far better."""
-    plan = Plan(steps=60, batch=4, size=80, epoch=60, workers=0, warm_up=10)
-    train(plan, step_cache(), held_out, tmp_path, say=lambda line: None)
+    plan = TrainingPlan(steps=60, batch=4, size=80, epoch=60, workers=0, warm_up=10)
+    train(plan, step_cache(), held_out, tmp_path, log=lambda line: None)
     clean = next(row for row in _table(tmp_path) if row["scenario"] == "clean smooth")
     assert float(clean["median"]) < 0.08

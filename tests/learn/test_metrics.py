@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from mitsuba_endo.decode.network import CHANNELS, read_heads
-from mitsuba_endo.learn.compose import Truth
+from mitsuba_endo.learn.compose import Targets
 from mitsuba_endo.learn.metrics import phase_error, pixel_metrics
 
 
-def _case() -> tuple[np.ndarray, Truth]:
+def _case() -> tuple[np.ndarray, Targets]:
     """Four rows of ten pixels; the last row is not lit. The network is off by 0.02 along u."""
     lattice = np.stack([np.linspace(3, 7, 40).reshape(4, 10), np.full((4, 10), 5.4)])
     lit = np.ones((4, 10), bool)
@@ -19,7 +17,7 @@ def _case() -> tuple[np.ndarray, Truth]:
     code[0, :4] = [0, 1, 2, 2]
     edge = np.zeros((4, 10), bool)
     edge[:, 5] = True
-    truth = Truth((lattice * lit).astype(np.float32), lit, code, edge)
+    truth = Targets((lattice * lit).astype(np.float32), lit, code, edge)
     angle = 2 * np.pi * (lattice + np.array([0.02, 0])[:, None, None])
     output = np.zeros((9, 4, 10), np.float32)
     output[0:4:2], output[1:4:2] = 0.3 * np.sin(angle), 0.3 * np.cos(angle)

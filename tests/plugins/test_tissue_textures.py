@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.capture.relief import relief
-from mitsuba_endo.capture.solid_fields import Placement, network_distance, waves
+from mitsuba_endo.capture.solid_fields import field_from_tissue, network_distance, waves
 from mitsuba_endo.capture.vessels import ABSORPTION, vessel_density
 
 
@@ -24,8 +24,8 @@ def _interaction(points: np.ndarray) -> Any:
 
 
 def _placed(points: np.ndarray, seed: int) -> np.ndarray:
-    placement = Placement.of_seed(seed)
-    return placement.R @ points + placement.t[:, None]
+    field = field_from_tissue(seed)
+    return field.R @ points + field.t[:, None]
 
 
 def test_vessels_in_mitsuba_are_those_in_numpy(llvm: str) -> None:
@@ -66,7 +66,7 @@ def test_relief_has_the_slope_that_is_asked_for(llvm: str) -> None:
         np.testing.assert_allclose(got[i], (ends[1] - ends[0]) / (2 * step), atol=2e-3)
     normal = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
     gradient = 0.2 * np.stack(relief(tuple(_placed(points, 1)))[1])
-    rotated = Placement.of_seed(1).R @ normal
+    rotated = field_from_tissue(1).R @ normal
     along_surface = gradient - rotated[:, None] * (rotated @ gradient)
     assert np.sqrt((along_surface**2).sum(0).mean()) == pytest.approx(0.2, rel=0.15)
 

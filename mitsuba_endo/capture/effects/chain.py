@@ -14,6 +14,7 @@ from .speckle import speckle
 from .vignetting import vignetting, wide_angle_cosine
 
 _SPECKLE, _SENSOR = 1, 2
+"""Numbers of the random streams."""
 
 
 def apply_effects(

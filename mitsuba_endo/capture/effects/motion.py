@@ -10,8 +10,8 @@ def motion_blur(image: NDArray[np.float32], length: float, angle: float) -> NDAr
 
     Args:
         image: (h, w, c) linear, mirrored at its edge.
-        length: of the way, pixels; 0 = still.
-        angle: of the way, radians from +x towards +y.
+        length: of the path, pixels; 0 = still.
+        angle: of the path, radians from +x towards +y.
     """
     if length == 0:
         return image

@@ -32,10 +32,10 @@ def speckle(
     intensity, half = _gamma_table(contrast)
     field = _gaussian_field(shape, _kernel(grain, half), rng)
     step = np.float32(_TABLE[1] - _TABLE[0])
-    place = np.clip((field - np.float32(_TABLE[0])) / step, 0, np.float32(len(_TABLE) - 1.001))
-    index = place.astype(np.int32)
+    entry = np.clip((field - np.float32(_TABLE[0])) / step, 0, np.float32(len(_TABLE) - 1.001))
+    index = entry.astype(np.int32)
     low = intensity[index]
-    field = low + (place - index.astype(np.float32)) * (intensity[index + 1] - low)
+    field = low + (entry - index.astype(np.float32)) * (intensity[index + 1] - low)
     return np.asarray(field, np.float32)
 
 

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from mitsuba_endo.dataset.config import Scene
-from mitsuba_endo.dataset.given import note, prepare_given
 from mitsuba_endo.dataset.run import failures
+from mitsuba_endo.dataset.user_mesh import load_user_mesh, note
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.rendering.scene_surfaces import scene_mesh
 from mitsuba_endo.shapes import Mesh, make_shape
@@ -46,15 +46,15 @@ def outward(mesh: Mesh) -> float:
 @pytest.mark.parametrize(("side", "share"), [("outside", 1.0), ("inside", 0.0)])
 def test_faces_are_turned_to_the_side_of_the_camera(tmp_path, inside_out, side, share):
     """Oracle: a ball's normals against its radius, wound either way."""
-    mesh = prepare_given(given(ball(tmp_path / "b.stl", inside_out=inside_out), side=side))
+    mesh = load_user_mesh(given(ball(tmp_path / "b.stl", inside_out=inside_out), side=side))
     assert outward(mesh) == share
 
 
 @pytest.mark.parametrize("inside_out", [False, True])
 def test_an_open_tube_is_turned_inwards(tmp_path, inside_out):
     """Oracle: the generator's own faces, which look inwards."""
-    mesh = prepare_given(given(tube(tmp_path / "t.ply", inside_out), side="inside"))
-    right = prepare_given(given(tube(tmp_path / "r.ply"), side="front"))
+    mesh = load_user_mesh(given(tube(tmp_path / "t.ply", inside_out), side="inside"))
+    right = load_user_mesh(given(tube(tmp_path / "r.ply"), side="front"))
     assert np.array_equal(np.sort(mesh.faces, 1), np.sort(right.faces, 1))
     normals = [np.cross(*(m.vertices[m.faces[:, i]] - m.vertices[m.faces[:, 0]] for i in (1, 2)))
                for m in (mesh, right)]  # fmt: skip
@@ -64,32 +64,32 @@ def test_an_open_tube_is_turned_inwards(tmp_path, inside_out):
 def test_metres_are_found_out_and_can_be_said(tmp_path):
     """Oracle: the same ball in both units; one without a believable size in either."""
     with pytest.raises(InputError, match=r"as if in metres.*try unit: m"):
-        prepare_given(given(ball(tmp_path / "b.ply", 0.04), side="outside"))
-    mesh = prepare_given(given(tmp_path / "b.ply", side="outside", unit="m"))
+        load_user_mesh(given(ball(tmp_path / "b.ply", 0.04), side="outside"))
+    mesh = load_user_mesh(given(tmp_path / "b.ply", side="outside", unit="m"))
     assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 40).max() < 1e-3
     with pytest.raises(InputError, match="correct the scene's unit"):
-        prepare_given(given(ball(tmp_path / "c.ply", 4e4), side="outside"))
+        load_user_mesh(given(ball(tmp_path / "c.ply", 4e4), side="outside"))
 
 
 def test_what_cannot_be_a_surface_is_refused(tmp_path):
     """Oracle: one mistake a file."""
     with pytest.raises(InputError, match="no such file"):
-        prepare_given(given(tmp_path / "none.ply"))
+        load_user_mesh(given(tmp_path / "none.ply"))
     (tmp_path / "text.ply").write_text("no mesh")
     with pytest.raises(InputError, match="not a readable mesh"):
-        prepare_given(given(tmp_path / "text.ply"))
+        load_user_mesh(given(tmp_path / "text.ply"))
     trimesh.PointCloud(np.eye(3)).export(tmp_path / "points.ply")
     with pytest.raises(InputError, match="no triangles"):
-        prepare_given(given(tmp_path / "points.ply"))
+        load_user_mesh(given(tmp_path / "points.ply"))
     make_shape("plane", edge=8).save(tmp_path / "plane.ply")
     with pytest.raises(InputError, match="two sides cannot be told apart"):
-        prepare_given(given(tmp_path / "plane.ply", side="inside"))
+        load_user_mesh(given(tmp_path / "plane.ply", side="inside"))
     mesh = make_shape("plane", edge=8)
     faces = mesh.faces.copy()
     faces[::3] = faces[::3, ::-1]
     Mesh(mesh.vertices, faces).save(tmp_path / "mixed.ply")
     with pytest.raises(InputError, match="wound against each other"):
-        prepare_given(given(tmp_path / "mixed.ply"))
+        load_user_mesh(given(tmp_path / "mixed.ply"))
 
 
 def test_a_non_manifold_surface_is_used_and_its_flaw_noted(tmp_path):
@@ -99,7 +99,7 @@ def test_a_non_manifold_surface_is_used_and_its_flaw_noted(tmp_path):
     fin = np.vstack([mesh.vertices, mesh.vertices[middle] + [0, 0, -3]])
     face = [middle, middle + 1, len(mesh.vertices)]
     Mesh(fin, np.vstack([mesh.faces, face])).save(tmp_path / "fin.ply")
-    prepared = prepare_given(given(tmp_path / "fin.ply"))
+    prepared = load_user_mesh(given(tmp_path / "fin.ply"))
     assert note(prepared)["edges_of_three_or_more_faces"] == 1
     config = small_config(scenes=[{"kind": "file", "file": str(tmp_path / "fin.ply")}])
     assert make_here(config, tmp_path / "out", 1).done == 1
@@ -121,7 +121,7 @@ def test_a_mitsuba_scene_gives_its_meshes(tmp_path):
     plane = make_shape("plane", edge=20)
     assert len(mesh.faces) == len(plane.faces) + 12
     assert mesh.bounds[1] == pytest.approx([40, 40, 70])
-    assert prepare_given(given(tmp_path / "s.xml")).bounds == pytest.approx(mesh.bounds)
+    assert load_user_mesh(given(tmp_path / "s.xml")).bounds == pytest.approx(mesh.bounds)
 
 
 def test_an_empty_scene_is_refused(tmp_path):
@@ -129,10 +129,10 @@ def test_an_empty_scene_is_refused(tmp_path):
     for content in ('<shape type="sphere"/>', ""):
         (tmp_path / "e.xml").write_text(f'<scene version="3.0.0">{content}</scene>')
         with pytest.raises(InputError, match="holds no triangle mesh"):
-            prepare_given(given(tmp_path / "e.xml"))
+            load_user_mesh(given(tmp_path / "e.xml"))
     (tmp_path / "broken.xml").write_text("<scene>")
     with pytest.raises(InputError, match="not valid XML"):
-        prepare_given(given(tmp_path / "broken.xml"))
+        load_user_mesh(given(tmp_path / "broken.xml"))
 
 
 def test_samples_of_a_users_tube_are_made_and_no_file_is_needed_any_more(tmp_path):

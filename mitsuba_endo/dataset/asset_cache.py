@@ -18,13 +18,14 @@ from .config import Config
 from .streams import stream
 
 FIGURE = "rabbit"
-FIGURE_HEIGHT = 60.0
-FIGURE_EDGE = 1.0
+"""Kind of scene whose mesh takes seconds to make."""
+FIGURE_HEIGHT, FIGURE_EDGE = 60.0, 1.0
+"""With which it is made, mm: edges of a sixtieth of its height, whatever height is drawn."""
 KEPT = 16
 """Patterns held in memory by a process."""
 
 
-class Workshop:
+class AssetCache:
     """Ready-made parts of a dataset's samples."""
 
     def __init__(self, config: Config, folder: str | Path) -> None:
@@ -54,9 +55,9 @@ class Workshop:
             save_mesh(path, Mesh((mesh.vertices - [0, 0, 1.0]) / FIGURE_HEIGHT, mesh.faces))
         return self._mesh(path)
 
-    def given(self, scene: int) -> Mesh:
+    def user_mesh(self, scene: int) -> Mesh:
         """Return the user's surface of the configuration's scene of this number."""
-        return self._mesh(given_path(self._folder, scene))
+        return self._mesh(user_mesh_path(self._folder, scene))
 
     def _draw_grid(self, variant: int) -> CodedGrid:
         ranges, rng = self._config.pattern, stream(self._config.seed, "pattern", variant)
@@ -90,16 +91,16 @@ class Workshop:
             return Mesh(data["vertices"], data["faces"])
 
 
-def given_path(folder: str | Path, scene: int) -> Path:
+def user_mesh_path(folder: str | Path, scene: int) -> Path:
     """Return where the surface of a scene of kind ``file`` is kept."""
     return Path(folder) / f"surface{scene:03d}.npz"
 
 
-def clear_workshop(folder: Path) -> None:
+def clear_assets(folder: Path) -> None:
     """Remove what was kept here, and the folder unless somebody put other files into it."""
     sweep(folder, alone=True)
-    for form in ("rabbit.npz", "pattern?????.npy", "surface???.npz"):
-        for path in folder.glob(form):
+    for name in ("rabbit.npz", "pattern?????.npy", "surface???.npz"):
+        for path in folder.glob(name):
             path.unlink(missing_ok=True)
     with contextlib.suppress(OSError):
         folder.rmdir()

@@ -33,8 +33,8 @@ _LONGEST_WALK = 256
 
 
 @dataclass(frozen=True, eq=False)
-class SetUp:
-    """What stands in the studio, whatever the poses."""
+class SceneParts:
+    """What a photograph's scene holds, whatever the poses."""
 
     mesh: Mesh
     """In the world, mm."""
@@ -57,12 +57,12 @@ class _View:
     """(h, w) on a surface across the ray."""
 
 
-class Studio:
-    """One scene, loaded once: to look for a place in it, and to be rendered light by light."""
+class PhotographScene:
+    """One scene, loaded once: to look for poses in it, and to be rendered light by light."""
 
-    def __init__(self, setup: SetUp, settings: CaptureSettings) -> None:
-        """Load the scene; camera and projector stand at the origin until :meth:`place`."""
-        self._tissue, self._setup, self._settings = settings.tissue, setup, settings
+    def __init__(self, parts: SceneParts, settings: CaptureSettings) -> None:
+        """Load the scene; camera and projector stand at the origin until :meth:`set_poses`."""
+        self._tissue, self._parts, self._settings = settings.tissue, parts, settings
         medium = None
         bsdf = opaque_tissue(self._tissue)
         walk = {"type": "path", "max_depth": settings.max_depth}
@@ -72,18 +72,18 @@ class Studio:
         self._integrator: Any = mi.load_dict(walk)
         self._direct: Any = mi.load_dict({"type": "path", "max_depth": 2})
         self._scene: Any = mi.load_dict({
-            "type": "scene", keys.CAMERA: _sensor(setup),
-            keys.SURFACE: _surface(setup.mesh, bsdf, medium), **_lights(setup, settings.light),
+            "type": "scene", keys.CAMERA: _sensor(parts),
+            keys.SURFACE: _surface(parts.mesh, bsdf, medium), **_lights(parts, settings.light),
         })  # fmt: skip
         self._parameters = mi.traverse(self._scene)
         self._view: _View | None = None
-        self.surface = MeshScene(setup.mesh.vertices, setup.mesh.faces, self._scene)
+        self.surface = MeshScene(parts.mesh.vertices, parts.mesh.faces, self._scene)
         """The mesh, to follow rays."""
 
-    def place(
+    def set_poses(
         self, world_from_camera: RigidTransform, projector_from_camera: RigidTransform
     ) -> Hits:
-        """Put camera, projector and lamp in their places (poses with OpenCV axes).
+        """Set the poses of camera, projector and lamp (OpenCV axes).
 
         Returns:
             Where the rays through the pixels' centres, row by row, meet the mesh.
@@ -142,37 +142,37 @@ class Studio:
 
     def _spread(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         tissue, view = self._tissue, self._view
-        assert view is not None, "place() comes first"
+        assert view is not None, "set_poses() comes first"
         return subsurface_blur(
             image, view.points, view.pixels_per_mm, tissue.mean_free_path, tissue.base_color,
             index_of_refraction(tissue.specular),
         )  # fmt: skip
 
     def _look(self, world_from_camera: RigidTransform) -> _View:
-        camera = self._setup.camera
+        camera = self._parts.camera
         hits = self.surface.through_pixels(camera, world_from_camera)
-        seen = hits.hit
-        check_view(float(seen.mean()), hits.from_behind(world_from_camera.t))
-        ways = hits.points - world_from_camera.t
-        distance = np.where(seen, np.sqrt(np.einsum("ni,ni->n", ways, ways)), np.nan)
+        hit = hits.hit
+        check_view(float(hit.mean()), hits.from_behind(world_from_camera.t))
+        rays = hits.points - world_from_camera.t
+        distance = np.where(hit, np.sqrt(np.einsum("ni,ni->n", rays, rays)), np.nan)
         shape = camera.height, camera.width
         return _View(
             hits,
-            np.where(seen[:, None], hits.points, np.nan).astype(np.float32).reshape(*shape, 3),
+            np.where(hit[:, None], hits.points, np.nan).astype(np.float32).reshape(*shape, 3),
             (camera.K[0, 0] / distance).astype(np.float32).reshape(shape),
         )
 
 
-def mean_intensity(setup: SetUp) -> float:
+def mean_intensity(parts: SceneParts) -> float:
     """Return the share of the power per steradian, on the axis, that a uniform pattern has."""
-    on_axis = setup.projector.density_xyz(np.zeros(1), np.zeros(1), np.ones(1))
-    return float(on_axis[0]) / (setup.pattern_size[0] * setup.pattern_size[1])
+    on_axis = parts.projector.density_xyz(np.zeros(1), np.zeros(1), np.ones(1))
+    return float(on_axis[0]) / (parts.pattern_size[0] * parts.pattern_size[1])
 
 
-def _lights(setup: SetUp, light: Light) -> dict[str, Any]:
-    lights = {keys.PROJECTOR: _projector(setup, light.projector_power)}
+def _lights(parts: SceneParts, light: Light) -> dict[str, Any]:
+    lights = {keys.PROJECTOR: _projector(parts, light.projector_power)}
     if light.lamp:
-        intensity = light.lamp * light.projector_power * mean_intensity(setup)
+        intensity = light.lamp * light.projector_power * mean_intensity(parts)
         lights |= _lamps(light.lamp_offset, intensity * np.array(light.lamp_color))
     return lights
 
@@ -182,8 +182,8 @@ def _pose(world_from_object: RigidTransform) -> Any:
     return mi.AffineTransform4f(mi.ScalarAffineTransform4f(matrix))
 
 
-def _sensor(setup: SetUp) -> dict[str, Any]:
-    camera, K = setup.camera, setup.camera.K
+def _sensor(parts: SceneParts) -> dict[str, Any]:
+    camera, K = parts.camera, parts.camera.K
     film = {"type": "hdrfilm", "width": camera.width, "height": camera.height,
             "rfilter": {"type": "box"}, "pixel_format": "rgb"}  # fmt: skip
     lens = dict(zip(keys.LENSES[camera.model], (float(k) for k in camera.distortion), strict=False))
@@ -194,10 +194,10 @@ def _sensor(setup: SetUp) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _projector(setup: SetUp, power: float) -> dict[str, Any]:
-    projector = setup.projector
-    image = np.ascontiguousarray(setup.pattern, np.float32)
-    width, height = setup.pattern_size
+def _projector(parts: SceneParts, power: float) -> dict[str, Any]:
+    projector = parts.projector
+    image = np.ascontiguousarray(parts.pattern, np.float32)
+    width, height = parts.pattern_size
     coefficients = (float(k) for k in projector.distortion.coefficients)
     return {
         "type": "doe_projector", "law": projector.law,
