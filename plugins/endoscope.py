@@ -1,4 +1,4 @@
-"""The sensor ``endoscope``: a camera with OpenCV's lens models."""
+"""The sensor ``endoscope``: a camera with the lens models of OpenCV and of wide angles."""
 
 from typing import Any
 
@@ -10,7 +10,6 @@ from mitsuba_endo.rendering.untyped import dr, mi
 from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 
 _INTRINSICS = ("fx", "fy", "cx", "cy")
-_MIN_COSINE = 0.01  # as in doe_projector
 
 
 class Endoscope:
@@ -20,7 +19,8 @@ class Endoscope:
 
      * - model
        - |string|
-       - ``opencv`` (pinhole with Brown distortion) or ``opencv_fisheye``. (Default: ``opencv``)
+       - ``opencv`` (pinhole with Brown distortion), ``opencv_fisheye``, ``omni`` (unified sphere),
+         ``double_sphere`` or ``scaramuzza`` (polynomial). (Default: ``opencv``)
        -
 
      * - fx, fy
@@ -36,7 +36,19 @@ class Endoscope:
 
      * - k1, k2, p1, p2, k3, k4, k5, k6
        - |float|
-       - Brown distortion in OpenCV's order; ``opencv_fisheye`` takes k1, k2, k3, k4. (Default: 0)
+       - Brown distortion in OpenCV's order; ``opencv_fisheye`` takes k1, k2, k3, k4 and ``omni``
+         k1, k2, p1, p2, k3. (Default: 0)
+       - |exposed|, |differentiable|
+
+     * - xi, alpha
+       - |float|
+       - Shift of the sphere of ``omni`` and ``double_sphere``, and the latter's second shift.
+         (Default: 0)
+       - |exposed|, |differentiable|
+
+     * - b1, b2, b3, b4, d, e
+       - |float|
+       - Polynomial of the normalised radius and skew of ``scaramuzza``. (Default: 0)
        - |exposed|, |differentiable|
 
      * - to_world
@@ -120,7 +132,7 @@ class Endoscope:
         self._refresh()
 
     def distortion(self) -> list[Any]:
-        """Return the lens coefficients in OpenCV's order."""
+        """Return the lens coefficients in the order of the model."""
         return [getattr(self, name) for name in LENSES[self.model]]
 
     def _local_direction(self, u: Any, v: Any) -> Any:
@@ -171,8 +183,7 @@ class Endoscope:
         x, y, z = swap_axes(self.to_world.inverse() @ point)
         length = dr.sqrt(x * x + y * y + z * z)
         active = active & (length >= self.near_clip) & (length <= self.far_clip)
-        if self.model == "opencv":
-            active &= z > _MIN_COSINE * length
+        active &= CAMERAS[self.model].projectable(self.distortion(), x, y, z)
         x, y, z = dr.select(active, x, 0.0), dr.select(active, y, 0.0), dr.select(active, z, 1.0)
         law = CAMERAS[self.model]
         a, b = law.normalise(self.distortion(), x, y, z)

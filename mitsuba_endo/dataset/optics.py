@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..geometry.cameras import CameraModel
+from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.endoscope import aimed_projector
 from ..geometry.laws import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
@@ -28,13 +28,13 @@ def draw_camera(ranges: CameraRanges, rng: np.random.Generator) -> CameraModel:
     for _ in range(CAMERA_TRIES):
         model = ranges.model.draw(rng)
         half = np.radians(ranges.fov.draw(rng)) / 2
-        # Without distortion a fisheye's image grows with the angle, a lens's with its tangent.
-        fx = ranges.width / 2 / (half if model == "opencv_fisheye" else np.tan(half))
         cx, cy = (
             (size - 1) / 2 + ranges.centre.draw(rng) for size in (ranges.width, ranges.height)
         )
-        K = np.array([[fx, 0, cx], [0, fx * ranges.aspect.draw(rng), cy], [0, 0, 1]])
+        aspect = ranges.aspect.draw(rng)
         distortion = tuple(float(k.draw(rng)) for k in ranges.distortion)
+        fx = ranges.width / 2 / CAMERAS[model].reach(distortion, half)
+        K = np.array([[fx, 0, cx], [0, fx * aspect, cy], [0, 0, 1]])
         camera = CameraModel(model, ranges.width, ranges.height, K, distortion)
         if _invertible(camera):
             return camera

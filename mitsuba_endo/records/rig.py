@@ -29,7 +29,8 @@ class Camera(Record):
     """Intrinsics of the camera, known beforehand."""
 
     model: str = "opencv"
-    """``opencv`` (pinhole + Brown) or ``opencv_fisheye``."""
+    """``opencv`` (pinhole + Brown), ``opencv_fisheye``, ``omni``, ``double_sphere`` or
+    ``scaramuzza``; ``kannala_brandt`` is another name of ``opencv_fisheye``."""
     width: PositiveInt
     """Pixels."""
     height: PositiveInt
@@ -37,11 +38,13 @@ class Camera(Record):
     K: Matrix3
     """Camera matrix, pixels, integer pixel = pixel centre."""
     distortion: list[float] = []
-    """Coefficients in OpenCV order: k1, k2, p1, p2, k3[, k4, k5, k6], or fisheye k1..k4."""
+    """Coefficients in the model's order: k1, k2, p1, p2, k3[, k4, k5, k6]; fisheye k1..k4; omni
+    xi, k1, k2, p1, p2, k3; double_sphere xi, alpha; scaramuzza b1..b4, d, e."""
 
     @field_validator("model")
     @classmethod
     def _known_model(cls, value: str) -> str:
+        value = "opencv_fisheye" if value == "kannala_brandt" else value
         if value not in CAMERAS:
             raise ValueError(f"unknown camera model '{value}'; choose from {', '.join(CAMERAS)}")
         return value

@@ -17,8 +17,11 @@ DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 LENSES = {
     "opencv": (*DISTORTION, "k4", "k5", "k6"),
     "opencv_fisheye": ("k1", "k2", "k3", "k4"),
+    "omni": ("xi", *DISTORTION),
+    "double_sphere": ("xi", "alpha"),
+    "scaramuzza": ("b1", "b2", "b3", "b4", "d", "e"),
 }
-"""Names of the camera's distortion for each model, in OpenCV's order."""
+"""Names of the camera's coefficients for each model, in the order of its class."""
 
 
 VERTEX_POSITIONS = "vertex_positions"
@@ -71,7 +74,7 @@ def intrinsics(camera: str = CAMERA) -> tuple[str, str, str, str]:
 
 
 def lens(model: str, camera: str = CAMERA) -> tuple[str, ...]:
-    """Return the keys of the camera's distortion coefficients, in OpenCV's order."""
+    """Return the keys of the camera's coefficients, in the order of its model."""
     return tuple(f"{camera}.{name}" for name in LENSES[model])
 
 

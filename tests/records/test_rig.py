@@ -144,7 +144,7 @@ MIRROR = [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
         (_with("camera.K", TWO_K), "camera.K", "at least 3 items"),
         (_with("camera.K", 400), "camera.K", "valid list, got 400"),
         (_without("camera.K"), "camera.K", "is missing; add it"),
-        (_with("camera.model", "fisheye"), "camera.model", "choose from opencv, opencv_fisheye"),
+        (_with("camera.model", "fisheye"), "camera.model", "choose from opencv, double_sphere"),
         (_with("camera.width", 0), "camera.width", "greater than 0, got 0"),
         (_with("camera.height", 3.5), "camera.height", "got 3.5"),
         (_with("camera.distortion", [0.1] * 6), "camera", "6 distortion coefficients"),

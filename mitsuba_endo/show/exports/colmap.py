@@ -17,13 +17,15 @@ from ...geometry.transforms import RigidTransform
 from ...records.solution import Solution
 from ...records.surface import load_surface
 from ..map_names import observed_names, own_surface_name
-from .known import camera_pose, known_camera, known_projector, known_size, projector_pose
+from .known import camera_in, camera_pose, known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
 from .tracks import Sightings, sightings
 
 _PIXEL_CENTRE = 0.5
 """COLMAP's first pixel spans 0 to 1; here its centre is 0."""
-_FULL_OPENCV, _FISHEYE = 8, 4
+_FULL_OPENCV = 8
+_MODELS = {"opencv": "FULL_OPENCV", "opencv_fisheye": "OPENCV_FISHEYE"}
+_COEFFICIENTS = {"FULL_OPENCV": _FULL_OPENCV, "OPENCV_FISHEYE": 4}
 
 
 @register_exporter(
@@ -38,8 +40,8 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
     the observed coordinate, which alone has noise; the error is in pattern pixels.
 
     Raises:
-        InputError: a value was not determined, the projector's law is not ``pinhole``, which is
-            the only one that COLMAP's cameras express, or the folder cannot be written.
+        InputError: a value was not determined, COLMAP has no camera like the camera's model or
+            the projector's law (it has ``pinhole`` only), or the folder cannot be written.
     """
     if solution.projector.law != "pinhole":
         raise InputError(
@@ -105,8 +107,8 @@ def _cameras(solution: Solution) -> list[str]:
 
 
 def _camera_line(camera: CameraModel) -> str:
-    fisheye = camera.model == "opencv_fisheye"
-    kind, count = ("OPENCV_FISHEYE", _FISHEYE) if fisheye else ("FULL_OPENCV", _FULL_OPENCV)
+    kind = camera_in(camera, _MODELS, "COLMAP")
+    count = _COEFFICIENTS[kind]
     K = camera.K
     centre = K[0, 2] + _PIXEL_CENTRE, K[1, 2] + _PIXEL_CENTRE
     values = [K[0, 0], K[1, 1], *centre, *_padded(camera.distortion, count)]

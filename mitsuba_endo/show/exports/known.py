@@ -20,6 +20,20 @@ def known_camera(solution: Solution) -> CameraModel:
     return solution.camera.to_model()
 
 
+def camera_in(camera: CameraModel, names: dict[str, str], program: str) -> str:
+    """Return what another program calls the camera's model.
+
+    Raises:
+        InputError: it has no such model.
+    """
+    if camera.model not in names:
+        raise InputError(
+            f"{program} has no camera like the model {camera.model}", "camera.model",
+            f"choose a format that has; {program} has {', '.join(names)}",
+        )  # fmt: skip
+    return names[camera.model]
+
+
 def known_projector(solution: Solution, frame: Frame) -> ProjectorModel:
     """Return the projector's intrinsics in a frame, which may have a focal length of its own.
 

@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...files import atomic_path
 from ...geometry.arrays import Array
+from ...geometry.cameras import CameraModel
 from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...records.solution import Frame, Solution
-from .known import camera_pose, known_camera, known_projector, known_size, projector_pose
+from .known import camera_in, camera_pose, known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
 
 _SUFFIXES = (".yaml", ".yml", ".xml", ".json")
+_MODELS = {"opencv": "calib3d", "opencv_fisheye": "fisheye", "omni": "omnidir"}
+"""OpenCV's module for each camera model."""
 
 
 @register_exporter("opencv", "FileStorage file: matrices, distortion, R, T")
@@ -25,7 +28,8 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
 
     ======================================  =======================================================
     camera_matrix, distortion_coefficients  of the camera, with image_width, image_height and
-                                            fisheye_model; a rig file can name this file as camera
+                                            fisheye_model, and xi if it is ``omnidir``'s; a rig
+                                            file can name this file as camera
     projector_matrix                        [[f, 0, cx], [0, f aspect, cy], [0, 0, 1]] of the first
                                             frame, pattern pixels, with projector_width and _height
     projector_law                           to what the matrix is applied: ``pinhole``, (x/z, y/z)
@@ -39,8 +43,8 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
     ======================================  =======================================================
 
     Raises:
-        InputError: a value was not determined, the suffix is not one of FileStorage's, or the
-            file cannot be written.
+        InputError: a value was not determined, OpenCV has no such camera model, the suffix is not
+            one of FileStorage's, or the file cannot be written.
     """
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(
@@ -49,7 +53,7 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
     camera, size = known_camera(solution), known_size(solution)
     poses = [(projector_pose(f), camera_pose(f)) for f in solution.frames]
     projectors = [known_projector(solution, f) for f in solution.frames]
-    fisheye = camera.model == "opencv_fisheye"
+    kind = camera_in(camera, _MODELS, "OpenCV")
     with atomic_path(path) as aside:
         storage = cv2.FileStorage(str(aside), cv2.FILE_STORAGE_WRITE)
         if not storage.isOpened():
@@ -57,9 +61,9 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
         storage.write("units", solution.units)
         storage.write("image_width", camera.width)
         storage.write("image_height", camera.height)
-        storage.write("fisheye_model", int(fisheye))
+        storage.write("fisheye_model", int(kind == "fisheye"))
         storage.write("camera_matrix", np.asarray(camera.K, np.float64))
-        storage.write("distortion_coefficients", _row(camera.distortion, 4 if fisheye else 5))
+        _write_lens(storage, camera, kind)
         storage.write("projector_law", projectors[0].law)
         storage.write("projector_width", size[0])
         storage.write("projector_height", size[1])
@@ -70,6 +74,19 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
         storage.write("T", poses[0][0].t.reshape(3, 1))
         _write_frames(storage, solution.frames, projectors, poses)
         storage.release()
+
+
+def _write_lens(storage: cv2.FileStorage, camera: CameraModel, kind: str) -> None:
+    """Write the coefficients; OpenCV's ``omnidir`` has its xi apart, and no k3."""
+    coefficients = [float(c) for c in camera.distortion]
+    if kind == "omnidir":
+        xi, *coefficients = coefficients
+        if any(coefficients[4:]):
+            raise InputError("omnidir has no k3", "camera.distortion", "use --format mitsuba")
+        storage.write("xi", np.array([[xi]]))
+        coefficients = coefficients[:4]
+    row = _row(coefficients, 5 if kind == "calib3d" else 4)
+    storage.write("distortion_coefficients", row)
 
 
 def _write_frames(
