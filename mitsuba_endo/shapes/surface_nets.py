@@ -49,7 +49,7 @@ def mesh_field(field: Field, low: ArrayLike, high: ArrayLike, cell: float) -> Me
     quads = _quads(inside, index)
     _check_closed(quads, len(points))
     vertices = _relax(field, origin + cell * points, quads)
-    return Mesh(vertices, _split(vertices, quads))
+    return Mesh(vertices, split_quads(vertices, quads))
 
 
 def _close_pinches(values: Array, rounds: int = 8) -> None:
@@ -155,8 +155,8 @@ def _relax(field: Field, points: Array, quads: Index, rounds: int = 3) -> Array:
     return project(field, points)
 
 
-def _split(vertices: Array, quads: Index) -> Index:
-    """Cut every quad into two triangles along its shorter diagonal."""
+def split_quads(vertices: Array, quads: Index) -> Index:
+    """Cut quads (Q, 4) into two triangles each (2 Q, 3) along their shorter diagonals."""
     a, b, c, d = (vertices[quads[:, k]] for k in range(4))
     first = np.linalg.norm(a - c, axis=1) <= np.linalg.norm(b - d, axis=1)
     turned = np.where(first[:, None], quads, np.roll(quads, -1, axis=1))
