@@ -35,6 +35,39 @@ def smooth_cells(inverse_range: Floats, rays: Floats) -> Bools:
     return across[:-1] & across[1:] & down[:, :-1] & down[:, 1:]
 
 
+def mended(inverse_range: Floats, rays: Floats) -> Floats:
+    """Return the image with single wild or missing pixels interpolated, where that is safe.
+
+    Wild is a pixel that no neighbour joins. It, and a missing one, becomes the mean of those beside
+    it, or above and below, that differ by no more than two pixels of one sheet may; else NaN.
+
+    Args:
+        inverse_range: (H, W), NaN = not seen.
+        rays: (H, W, 3) unit directions.
+    """
+    across = np.pad(_joined(inverse_range, rays), ((0, 0), (1, 1)))
+    down = np.pad(_joined(inverse_range.T, rays.transpose(1, 0, 2)).T, ((1, 1), (0, 0)))
+    alone = ~(across[:, 1:] | across[:, :-1] | down[1:] | down[:-1])
+    kept = np.where(alone, np.nan, inverse_range)
+    beside = _bridged(kept, rays)
+    above = _bridged(kept.T, rays.transpose(1, 0, 2)).T
+    both = np.where(
+        np.isnan(beside), above, np.where(np.isnan(above), beside, (beside + above) / 2)
+    )
+    return np.where(np.isnan(kept), both, kept)
+
+
+def _bridged(inverse: Floats, rays: Floats) -> Floats:
+    """Return the means (H, W) of the two pixels beside each in a row; NaN where they leap."""
+    first, last = inverse[:, :-2], inverse[:, 2:]
+    angle = np.linalg.norm(rays[:, 2:] - rays[:, :-2], axis=-1)
+    mean = (first + last) / 2
+    slack = FREE_STEP * angle * mean + NOISE_DEVIATIONS * np.sqrt(2) * noise(inverse)
+    with np.errstate(invalid="ignore"):
+        near = np.abs(last - first) <= slack
+    return np.pad(np.where(near, mean, np.nan), ((0, 0), (1, 1)), constant_values=np.nan)
+
+
 def _joined(inverse: Floats, rays: Floats) -> Bools:
     """Tell which neighbours along a row (H, W - 1) belong to one sheet."""
     step = np.diff(inverse, axis=1)

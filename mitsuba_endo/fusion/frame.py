@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
-from .depth_edges import smooth_cells
+from .depth_edges import mended, smooth_cells
 
 Floats = NDArray[np.float64]
 
@@ -43,8 +43,11 @@ class RangeFrame:
 
     @cached_property
     def inverse_range(self) -> Floats:
-        """(H, W) linear over a plane, up to the rays' bend between pixels; NaN = not seen."""
-        return 1 / np.where(self.seen, self.range, np.nan)
+        """(H, W) linear over a plane, up to the rays' bend between pixels; NaN = not seen.
+
+        Single pixels that are missing or wild are interpolated where their neighbours agree.
+        """
+        return mended(1 / np.where(self.seen, self.range, np.nan), self.camera.grid_rays)
 
     @cached_property
     def spacing(self) -> Floats:
@@ -72,7 +75,7 @@ class Cells:
     cosine: Floats
     """(H - 1, W - 1) of the angle between the ray and the surface's normal."""
     weight: Floats
-    """(H - 1, W - 1) mean of the pixels'."""
+    """(H - 1, W - 1) mean of the pixels'; what was not seen counts as zero."""
     cone: Floats
     """(H - 1, W - 1) cosine of an angle about the first pixel's ray that holds the cell."""
 
@@ -83,7 +86,8 @@ class Cells:
         cosine = _cosines(frame.camera.grid_rays, 1 / inverse, smooth)
         cone = np.cos(3 * frame.spacing[:-1, :-1])
         weight = inverse**4 if frame.weight is None else frame.weight
-        return cls(smooth, cosine, np.where(smooth, _corner_mean(weight), 0.0), cone)
+        weight = _corner_mean(np.where(frame.seen, weight, 0.0))
+        return cls(smooth, cosine, np.where(smooth, weight, 0.0), cone)
 
 
 def _corner_mean(values: Floats) -> Floats:

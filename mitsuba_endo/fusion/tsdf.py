@@ -155,7 +155,7 @@ def _samples(frame: RangeFrame, spacing: float) -> Floats:
 
     A steep wall's pixels lie far apart: their cells are divided as often as need be.
     """
-    points = frame.camera.grid_rays * frame.range[..., None]
+    points = frame.camera.grid_rays / frame.inverse_range[..., None]
     smooth = frame.cells.smooth
     corners = [points[:-1, :-1], points[:-1, 1:], points[1:, :-1], points[1:, 1:]]
     a, b, c, d = (corner[smooth] for corner in corners)

@@ -248,3 +248,17 @@ def test_frames_that_saw_nothing_change_nothing() -> None:
         np.full_like(frames[0].range, np.nan), frames[0].camera, frames[0].world_from_camera
     )
     assert np.array_equal(fuse([frames[0], nothing, frames[1]]).vertices, fuse(frames).vertices)
+
+
+def test_gross_outliers_leave_no_spikes_and_few_holes() -> None:
+    """A pixel apart from its neighbours is no part of a sheet, and mended if they agree."""
+    rng = np.random.default_rng(2)
+    frames = []
+    for frame in inside_a_sphere():
+        wild = rng.random(frame.range.shape) < 0.02
+        ranges = np.where(wild, rng.uniform(5, 60, wild.shape), frame.range)
+        frames.append(RangeFrame(ranges, frame.camera, frame.world_from_camera))
+    mesh = fuse(frames)
+    check_clean(mesh)
+    assert np.abs(from_centre(mesh.vertices)).max() < voxel_size(frames)
+    assert len(mesh.vertices) > 0.97 * len(fuse(inside_a_sphere()).vertices)
