@@ -25,9 +25,28 @@ Maps = Annotated[
 ]
 RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: what is known and what is not.")]
 Out = Annotated[Path, typer.Option("--out", help="Solution folder to write.")]
+_SOLVERS = ("levenberg-marquardt", "gauss-newton", "adam")
+"""Known without loading the solver: the default, its old name, and the published one."""
+
+
+def _known_solver(name: str) -> str:
+    """Refuse the name of a solver that nobody registered."""
+    if name not in _SOLVERS:
+        from ..solve.minimisers.minimise import ALIASES, MINIMISERS
+
+        if name not in MINIMISERS:
+            choices = ", ".join([*MINIMISERS, *ALIASES])
+            raise typer.BadParameter(f"'{name}' is unknown; choose from {choices}")
+    return name
+
+
 Solver = Annotated[
-    Literal["gauss-newton", "adam"],
-    typer.Option(help="Gauss-Newton, or the published first-order method."),
+    str,
+    typer.Option(
+        metavar="NAME",
+        callback=_known_solver,
+        help="levenberg-marquardt (also gauss-newton), or adam, the published first-order method.",
+    ),
 ]
 Start = Annotated[
     Literal["search", "plane"],
@@ -62,7 +81,7 @@ def calibrate(
     maps: Maps,
     rig: RigFile,
     out: Out,
-    solver: Solver = "gauss-newton",
+    solver: Solver = "levenberg-marquardt",
     start: Start = "search",
     share: Share = None,
     seed: Seed = 0,

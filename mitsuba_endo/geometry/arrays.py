@@ -14,18 +14,18 @@ import numpy as np
 Array = Any
 
 _NUMPY = SimpleNamespace(
-    sqrt=np.sqrt, sin=np.sin, cos=np.cos, tan=np.tan, atan2=np.arctan2, abs=np.abs,
+    sqrt=np.sqrt, exp=np.exp, sin=np.sin, cos=np.cos, tan=np.tan, atan2=np.arctan2, abs=np.abs,
     where=np.where, detach=lambda x: x, maximum=np.maximum, minimum=np.minimum,
 )  # fmt: skip
 
 
 def namespace(*arrays: Array) -> Any:
-    """Return sqrt, sin, cos, tan, atan2, abs, where, detach, maximum, minimum for ``arrays``."""
+    """Return the functions named above for NumPy or for Dr.Jit, whichever ``arrays`` are of."""
     if not any(is_drjit(a) for a in arrays):
         return _NUMPY
     dr = sys.modules["drjit"]
     return SimpleNamespace(
-        sqrt=dr.sqrt, sin=dr.sin, cos=dr.cos, tan=dr.tan, atan2=dr.atan2, abs=dr.abs,
+        sqrt=dr.sqrt, exp=dr.exp, sin=dr.sin, cos=dr.cos, tan=dr.tan, atan2=dr.atan2, abs=dr.abs,
         where=dr.select, detach=dr.detach, maximum=dr.maximum, minimum=dr.minimum,
     )  # fmt: skip
 

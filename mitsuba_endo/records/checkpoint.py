@@ -1,5 +1,6 @@
 """The state of an optimisation on disk, from which it can go on."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,9 +9,26 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import DAMAGED_NPZ, atomic_path
-from ..geometry.transforms import RigidTransform
 
 FILE = "state.npz"
+FORMAT = 2
+"""Of the file; version 0.1 wrote files without a number."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceRecord:
+    """One surface of an optimisation."""
+
+    kind: str
+    """Name of the class that reads ``arrays``."""
+    arrays: Mapping[str, NDArray]
+    """What the surface is made of, besides its values."""
+    values: NDArray[np.float64]
+    """(V,) one value a vertex."""
+    weight: float
+    """Of its smoothness."""
+    disparity: float
+    """Focal length times baseline that scales its smoothness, pattern pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,47 +36,36 @@ class Checkpoint:
     """Everything of an optimisation that its input files do not hold; lengths in baselines."""
 
     law: str
-    stage: int
-    """Stage of the robust objective."""
+    last_stage: bool
+    """Whether the robust loss was in its last stage."""
     names: list[str]
     """Frames that are part of it."""
     used: list[NDArray[np.bool_]]
-    """(H, W) correspondences of every frame that enter the objective."""
-    cells: list[float]
-    """Lattice spacing of every surface, radians."""
-    lattices: list[NDArray[np.int64]]
-    """(V, 2) lattice indices of every surface's vertices."""
-    faces: list[NDArray[np.int64]]
-    """(F, 3) triangles of every surface."""
-    weights: list[float]
-    """Of every surface's curvature prior."""
-    disparities: list[float]
-    """Focal length times baseline that scales every prior, pattern pixels."""
-    rho: list[NDArray[np.float64]]
-    """(V,) inverse ranges of every surface."""
-    world_from_camera: list[RigidTransform]
-    projector_from_camera: list[RigidTransform]
-    intrinsics: list[NDArray[np.float64]]
-    """(9,) of every frame."""
+    """(H, W) correspondences of every frame that enter the cost."""
+    surfaces: list[SurfaceRecord]
+    values: Mapping[str, list[NDArray[np.float64]]]
+    """Of every block of unknowns one array for each owner: a pose as (4, 4), others as (n,)."""
 
 
 def save_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint as npz."""
-    frames, surfaces = len(checkpoint.names), len(checkpoint.rho)
     arrays = {
+        "format": np.array(FORMAT),
         "law": np.array(checkpoint.law),
-        "stage": np.array(checkpoint.stage),
+        "last_stage": np.array(checkpoint.last_stage),
         "names": np.array(checkpoint.names),
-        "cells": np.array(checkpoint.cells),
-        "weights": np.array(checkpoint.weights),
-        "disparities": np.array(checkpoint.disparities),
-        "intrinsics": np.array(checkpoint.intrinsics),
-        "world_from_camera": np.array([p.matrix() for p in checkpoint.world_from_camera]),
-        "projector_from_camera": np.array([p.matrix() for p in checkpoint.projector_from_camera]),
-        **{f"used_{k}": checkpoint.used[k] for k in range(frames)},
-        **{f"lattice_{i}": checkpoint.lattices[i] for i in range(surfaces)},
-        **{f"faces_{i}": checkpoint.faces[i] for i in range(surfaces)},
-        **{f"rho_{i}": checkpoint.rho[i] for i in range(surfaces)},
+        "blocks": np.array(list(checkpoint.values)),
+        "kinds": np.array([s.kind for s in checkpoint.surfaces]),
+        "weights": np.array([s.weight for s in checkpoint.surfaces]),
+        "disparities": np.array([s.disparity for s in checkpoint.surfaces]),
+        **{f"used_{k}": used for k, used in enumerate(checkpoint.used)},
+        **{f"block_{name}": np.array(values) for name, values in checkpoint.values.items()},
+        **{f"values_{i}": s.values for i, s in enumerate(checkpoint.surfaces)},
+        **{
+            f"surface_{i}_{key}": array
+            for i, s in enumerate(checkpoint.surfaces)
+            for key, array in s.arrays.items()
+        },
     }
     with atomic_path(path) as aside:
         np.savez_compressed(aside, **arrays)
@@ -68,7 +75,7 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
     """Read the checkpoint of a solution folder.
 
     Raises:
-        InputError: there is none, or it is damaged.
+        InputError: there is none, it is damaged, or another version wrote it.
     """
     path = Path(folder) / FILE
     if not path.is_file():
@@ -76,26 +83,36 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
     try:
         # NumPy itself leaves a damaged file open.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            names = [str(n) for n in data["names"]]
-            surfaces = range(len(data["cells"]))
-            return Checkpoint(
-                law=str(data["law"]),
-                stage=int(data["stage"]),
-                names=names,
-                used=[data[f"used_{k}"] for k in range(len(names))],
-                cells=data["cells"].tolist(),
-                lattices=[data[f"lattice_{i}"] for i in surfaces],
-                faces=[data[f"faces_{i}"] for i in surfaces],
-                weights=data["weights"].tolist(),
-                disparities=data["disparities"].tolist(),
-                rho=[data[f"rho_{i}"] for i in surfaces],
-                world_from_camera=_poses(data["world_from_camera"]),
-                projector_from_camera=_poses(data["projector_from_camera"]),
-                intrinsics=list(data["intrinsics"]),
-            )
+            if "format" not in data or int(data["format"]) != FORMAT:
+                raise InputError(
+                    "was written by another version of this program", str(path),
+                    "calibrate anew without --resume",
+                )  # fmt: skip
+            return _read(data)
+    except InputError:
+        raise
     except DAMAGED_NPZ:
         raise InputError("is not a readable checkpoint", str(path), "start anew") from None
 
 
-def _poses(matrices: NDArray[np.float64]) -> list[RigidTransform]:
-    return [RigidTransform(m[:3, :3], m[:3, 3]) for m in matrices]
+def _read(data: Mapping[str, NDArray]) -> Checkpoint:
+    names = [str(n) for n in data["names"]]
+    return Checkpoint(
+        law=str(data["law"]),
+        last_stage=bool(data["last_stage"]),
+        names=names,
+        used=[data[f"used_{k}"] for k in range(len(names))],
+        surfaces=[_surface(data, i) for i in range(len(data["kinds"]))],
+        values={str(name): list(data[f"block_{name}"]) for name in data["blocks"]},
+    )
+
+
+def _surface(data: Mapping[str, NDArray], i: int) -> SurfaceRecord:
+    prefix = f"surface_{i}_"
+    return SurfaceRecord(
+        kind=str(data["kinds"][i]),
+        arrays={key.removeprefix(prefix): data[key] for key in data if key.startswith(prefix)},
+        values=data[f"values_{i}"],
+        weight=float(data["weights"][i]),
+        disparity=float(data["disparities"][i]),
+    )

@@ -162,6 +162,8 @@ class Solution(Record):
     warnings: list[str] = []
     camera: Camera | None = None
     projector: ProjectorEstimate
+    blocks: dict[str, Estimate] = {}
+    """Further unknowns that were estimated, by the name of their block in the rig's ``share``."""
     frames: list[Frame] = Field(min_length=1)
     left_out: list[LeftOut] = []
     alternatives: list[Alternative] = []

@@ -38,3 +38,8 @@ def cast_into(scene: Any, origin: Any, direction: Any) -> tuple[Any, Any]:
     found = scene.ray_intersect_preliminary(ray, coherent=True)
     hit = found.is_valid()
     return dr.select(hit, found.prim_index, 0), hit
+
+
+def vector(values: NDArray[np.float64]) -> Any:
+    """Return an (N, 3) array as a Dr.Jit vector."""
+    return mi.Vector3d(*(np.ascontiguousarray(values[:, i], np.float64) for i in range(3)))

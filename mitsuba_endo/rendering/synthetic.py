@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from .moving_mesh import MovingMesh, cast_into
-from .untyped import mi
+from .moving_mesh import MovingMesh, cast_into, vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +102,7 @@ class MeshScene:
     def cast(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
         """Follow rays from an origin (3,), or one for each (N, 3), along directions (N, 3)."""
         triangle, hit = self._cast(
-            _vector(np.broadcast_to(origin, directions.shape)), _vector(directions)
+            vector(np.broadcast_to(origin, directions.shape)), vector(directions)
         )
         index = triangle.numpy().astype(np.int64)
         a, b, c = (self._vertices[self._faces[index, i]] for i in range(3))
@@ -126,7 +125,3 @@ class MeshScene:
         met = self.cast(origin, way / distance[:, None])
         reached = np.linalg.norm(np.nan_to_num(met.points) - origin, axis=1)
         return ~met.hit | (reached > distance * (1 - 1e-3))
-
-
-def _vector(values: NDArray[np.float64]) -> Any:
-    return mi.Vector3d(*(np.ascontiguousarray(values[:, i]) for i in range(3)))

@@ -1,5 +1,6 @@
 """Calibration: from correspondence maps and a rig to projector, poses and surface."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -12,15 +13,14 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
-from .fit import Fit
+from .frames.weights import balanced
 from .history import History
-from .optimise.run import Progress
+from .inference.fit import Fit
+from .inference.model_choice import cheaper, choose_law
+from .minimisers.minimise import Progress, minimiser_of
 from .options import Options
-from .pipeline import Found, Job, finish, search
-from .prepare.resume import checkpoint_of
-from .prepare.weights import balanced
-from .results.assemble import assemble
-from .results.law_evidence import cheaper, choose_law
+from .pipeline import Job, Optimised, infer, optimise, optimise_again
+from .reporting.assemble import assemble
 
 
 def calibrate(
@@ -38,7 +38,7 @@ def calibrate(
         rig: what is known, and which unknowns the frames share.
         options: how to solve.
         progress: called with the share of the work done and the name of the step.
-        resume: an earlier calibration of these maps to go on with; its law is kept.
+        resume: an earlier calibration of these maps to go on with; its projection model is kept.
         observe: called after every iteration with where it stands, lengths in baselines.
 
     Returns:
@@ -50,62 +50,63 @@ def calibrate(
     options = options or Options()
     say = progress or (lambda _share, _step: None)
     check_maps(maps, rig)
+    minimiser_of(options)  # an unknown one is told before any work
     camera = rig.camera.to_model()
-    laws = (
-        [resume.law]
-        if resume
-        else list(LAWS)
-        if rig.projector.law == AUTO_LAW
-        else [rig.projector.law]
-    )
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
-        given = balanced(maps)
-        jobs = [Job(given, camera, rig, law, options, resume, history=History(observe))
-                for law in laws]  # fmt: skip
+        weighted = balanced(maps)
+        jobs = [
+            Job(weighted, camera, rig, law, options, resume, history=History(observe))
+            for law in _laws(rig, resume)
+        ]
         fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
         return assemble(fit, camera, rig, options, evidence, warnings)
 
 
-def solve_each(jobs: list[Job], say: Progress) -> list[Fit]:
-    """Solve the same maps under each law, and under each from where the others ended too.
+def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:
+    """Return the projection models to solve under."""
+    if resume is not None:
+        return [resume.law]
+    return list(LAWS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
 
-    A law is compared at its best: where the data say little, its own start may lie in a valley
-    that leads elsewhere, and another law's solution is a start as good as its own.
+
+def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:
+    """Solve the same maps under each projection model, and from where the others ended too.
+
+    A model is compared at its best: where the data say little, its own start may lie in a valley
+    that leads elsewhere, and another model's solution is a start as good as its own.
 
     Returns:
-        One fit a law; the interrupted one alone where the user stopped.
+        One fit a model; the interrupted one alone where the user stopped.
     """
-    parts = 2 * len(jobs) if len(jobs) > 1 else 1  # one law has no others to start from
-    done = _part(say, parts, parts)
+    parts = 2 * len(jobs) if len(jobs) > 1 else 1  # an only one has no others to start from
+    last = _part(say, parts, parts)
     stopping = _part(lambda share, step: say(share, f"Stopping: {step.lower()}"), parts, parts)
-    found: list[Found] = []
+    done: list[Optimised] = []
     for i, job in enumerate(jobs):
-        found.append(search(job, _part(say, i, parts)))
-        if found[-1].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[-1], stopping)]
+        done.append(optimise(job, _part(say, i, parts)))
+        if done[-1].result.outcome is Outcome.INTERRUPTED:
+            return [infer(job, done[-1], stopping)]
     for i, job in enumerate(jobs):
-        found[i] = _from_others(job, i, found, _part(say, len(jobs) + i, parts))
-        if found[i].optimum.outcome is Outcome.INTERRUPTED:
-            return [finish(job, found[i], stopping)]
-    return [finish(job, f, done) for job, f in zip(jobs, found, strict=True)]
+        done[i] = _from_others(job, i, done, _part(say, len(jobs) + i, parts))
+        if done[i].result.outcome is Outcome.INTERRUPTED:
+            return [infer(job, done[i], stopping)]
+    return [infer(job, d, last) for job, d in zip(jobs, done, strict=True)]
 
 
-def _from_others(job: Job, law: int, found: list[Found], say: Progress) -> Found:
-    """Return the better of where a law ended by itself and from where the other laws ended."""
-    best = own = found[law]
-    for other in (f for k, f in enumerate(found) if k != law):
+def _from_others(job: Job, index: int, done: Sequence[Optimised], say: Progress) -> Optimised:
+    """Return the better of where a model ended by itself and from where the others ended."""
+    best = own = done[index]
+    for other in (d for k, d in enumerate(done) if k != index):
         if [m.name for m in other.maps] != [m.name for m in own.maps]:
             continue
-        start = replace(checkpoint_of(other.optimum), law=job.law, stage=0)
-        alike = replace(job, resume=start, foreseen=[], history=History())
-        again = search(alike, say).optimum
-        if again.outcome is Outcome.INTERRUPTED:
-            return replace(best, optimum=replace(best.optimum, outcome=Outcome.INTERRUPTED))
-        if cheaper(again, best.optimum):
-            best = replace(own, optimum=again)
+        result = optimise_again(job, other.result, say)
+        if result.outcome is Outcome.INTERRUPTED:
+            return replace(best, result=replace(best.result, outcome=Outcome.INTERRUPTED))
+        if cheaper(result, best.result):
+            best = replace(own, result=result)
     return best
 
 

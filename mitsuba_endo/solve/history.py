@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from ..records.calibration import Snapshot, TraceRow
 from ..records.history import Observe
-from .cost.problem import Problem
-from .optimise.run import OnIteration
-from .unknowns.lattice import Lattice
-from .unknowns.state import INTRINSICS, State
+from .costs.problem import Problem
+from .minimisers.minimise import OnIteration
+from .surfaces.surface import Surface
+from .unknowns.state import State
 
 VERTICES = 2500
 """Of all surfaces of a snapshot together."""
@@ -22,7 +22,7 @@ class History:
     def __init__(self, observe: Observe | None = None) -> None:
         self.snapshots: list[Snapshot] = []
         self._observe = observe
-        self._parts: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
+        self._parts: list[tuple[Surface, NDArray[np.int64]]] = []
         self._faces: list[NDArray[np.int64]] = []
         self._before = 0
 
@@ -50,9 +50,8 @@ class History:
 
     def _set_meshes(self, problem: Problem) -> None:
         room = max(VERTICES // len(problem.surfaces), 100)
-        coarse = [coarsened(s.lattice, room) for s in problem.surfaces]
-        directions = [s.lattice.directions for s in problem.surfaces]
-        self._parts = [(kept, d[kept]) for (kept, _), d in zip(coarse, directions, strict=True)]
+        coarse = [s.coarsened(room) for s in problem.surfaces]
+        self._parts = [(s, kept) for s, (kept, _) in zip(problem.surfaces, coarse, strict=True)]
         self._faces = [faces for _, faces in coarse]
 
     def _add(
@@ -62,34 +61,15 @@ class History:
             iteration=iteration,
             cost=cost,
             scale_px=scale_px,
-            focal=[float(np.exp(v[INTRINSICS["focal"]][0])) for v in state.intrinsics],
+            focal=state.focals,
             surfaces=[
-                directions / rho[kept][:, None]
-                for (kept, directions), rho in zip(self._parts, state.rho, strict=True)
+                surface.vertices(values)[kept]
+                for (surface, kept), values in zip(self._parts, state.surfaces, strict=True)
             ],
             faces=self._faces,
-            world_from_camera=state.world_from_camera,
-            projector_from_camera=state.projector_from_camera,
+            world_from_camera=state.camera_poses,
+            projector_from_camera=state.projector_poses,
         )
         self.snapshots.append(snapshot)
         if self._observe is not None:
             self._observe(snapshot)
-
-
-def coarsened(lattice: Lattice, room: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return every n-th vertex of a lattice, at most ``room`` or so, and triangles over them.
-
-    Returns:
-        (K,) indices of the vertices kept, and (F, 3) triangles of indices into those. A square of
-        the coarse lattice is covered where its four corners exist.
-    """
-    step = max(1, int(np.ceil(np.sqrt(lattice.size / room))))
-    low = lattice.ij.min(0)
-    kept = np.flatnonzero(((lattice.ij - low) % step == 0).all(1))
-    column, row = ((lattice.ij[kept] - low) // step).T
-    index = np.full((row.max() + 2, column.max() + 2), -1)
-    index[row, column] = np.arange(len(kept))
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
-    whole = (a >= 0) & (b >= 0) & (c >= 0) & (d >= 0)
-    a, b, c, d = (corner[whole] for corner in (a, b, c, d))
-    return kept, np.concatenate([np.stack([a, b, c], 1), np.stack([b, d, c], 1)])

@@ -8,8 +8,9 @@ from typing import Literal
 class Options:
     """Options of :func:`mitsuba_endo.solve.calibrate.calibrate`."""
 
-    solver: Literal["gauss-newton", "adam"] = "gauss-newton"
-    """``gauss-newton`` (Levenberg-Marquardt), or the published first-order ``adam``."""
+    solver: str = "levenberg-marquardt"
+    """A registered minimiser: ``levenberg-marquardt`` (``gauss-newton`` is its old name), or the
+    published first-order ``adam``."""
     start: Literal["search", "plane"] = "search"
     """``search`` needs no guess; ``plane`` is the published plane and front-parallel projector."""
     cameras: Literal["registration", "identity"] = "registration"
@@ -18,7 +19,7 @@ class Options:
     plane_distance: float = 10.0
     """Distance of the starting plane, in baselines (start = plane)."""
     max_iterations: int = 60
-    """Limit for Gauss-Newton."""
+    """Limit for Levenberg-Marquardt."""
     adam_iterations: int = 20_000
     """Limit for Adam."""
     tolerance: float = 0.2

@@ -1,7 +1,7 @@
 """The stages from maps to a fit, for one frame, frames with their own surfaces, or a shared one."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -13,29 +13,24 @@ from ..records.rig import Rig
 from ..records.solution import LeftOut, Outcome
 from ..start.registration import RangeImage, Registration, register_frames
 from ..start.result import Start
-from .cost.drift import drift_prior
-from .cost.problem import Problem
-from .fit import Fit
+from .costs.problem import Problem, make_problem
+from .frames.alone import solve_alone
+from .frames.initialisation import common_start, usable_starts, without_faults, without_repeats
+from .frames.joint import at_identity, extended, joint_problem, seen_from_first
+from .frames.restart import with_restarts
+from .frames.resume import resumed_maps, resumed_problem
+from .frames.single import separate_surfaces
 from .history import History
-from .optimise.optimum import Optimum
-from .optimise.polish import smooth_surfaces
-from .optimise.run import OnIteration, Progress, optimise
+from .inference.covariance import uncertainty
+from .inference.fit import Fit, FrameSolution
+from .inference.frame_consistency import consistencies, worst
+from .inference.observability import Direction
+from .inference.predicted_observability import predicted_directions
+from .minimisers.minimise import OnIteration, Progress, minimise
+from .minimisers.result import OptimisationResult
+from .minimisers.smoothing import smooth_surfaces
 from .options import Options
-from .prepare.agreement import agreements, worst
-from .prepare.frames import (
-    common_start,
-    solve_alone,
-    usable_starts,
-    without_faults,
-    without_repeats,
-)
-from .prepare.joint import FrameStart, at_identity, extended, joint_problem, seen_from_first
-from .prepare.resume import resumed_maps, resumed_problem
-from .prepare.single import separate_surfaces
-from .statistics.foresight import foreseen_directions
-from .statistics.observability import Direction
-from .statistics.uncertainty import uncertainty
-from .unknowns.plan import make_plan
+from .unknowns.layout import Layout, make_layout
 from .unknowns.state import State
 
 _MAX_EXTENSIONS = 10
@@ -44,7 +39,7 @@ _MAX_EXTENSIONS = 10
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What is to be solved, under one projector law."""
+    """What is to be solved, under one projection model."""
 
     maps: list[CorrespondenceMap]
     camera: CameraModel
@@ -55,8 +50,6 @@ class Job:
     """Earlier calibration to go on with."""
     timings: dict[str, float] = field(default_factory=dict)
     """Seconds of every stage, filled in while solving."""
-    foreseen: list[Direction] = field(default_factory=list)
-    """What the start of the last optimisation leaves free, likewise."""
     history: History = field(default_factory=History)
     """How the last optimisation went, likewise."""
 
@@ -67,25 +60,31 @@ class Job:
         yield
         self.timings[stage] = self.timings.get(stage, 0.0) + time.perf_counter() - began
 
+    def layout(self, frames: int) -> Layout:
+        """Return the layout of the unknowns of so many frames."""
+        return make_layout(self.rig, frames)
+
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Optimised:
     """Where an optimisation of a job ended."""
 
     maps: list[CorrespondenceMap]
     """The frames that are part of it."""
     left_out: list[LeftOut]
     notes: list[str]
-    optimum: Optimum
+    result: OptimisationResult
+    predicted: list[Direction]
+    """What its start left free."""
 
 
-def search(job: Job, say: Progress) -> Found:
+def optimise(job: Job, say: Progress) -> Optimised:
     """Search for a start and optimise.
 
     Raises:
         InputError: no frame can be used, or the plan contradicts itself.
     """
-    make_plan(job.rig, len(job.maps))  # a contradiction is told before any work
+    job.layout(len(job.maps))  # a contradiction is told before any work
     if job.resume is not None:
         return _resumed(job, job.resume, say)
     if len(job.maps) > 1 and job.rig.share.surface == "shared":
@@ -93,83 +92,106 @@ def search(job: Job, say: Progress) -> Found:
     return _own_surfaces(job, say)
 
 
-def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Found:
+def optimise_again(job: Job, other: OptimisationResult, say: Progress) -> OptimisationResult:
+    """Optimise under the job's projection model from where another model's result ended."""
+    old = other.problem
+    problem = make_problem(old.observed, old.surfaces, other.state, old.layout, job.law, old.others)
+    aside = replace(job, history=History())  # what is kept is how the model's own way went
+    return _optimise(aside, problem, other.state, _reporter(job, say, 0.1))[0]
+
+
+def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Optimised:
     maps = resumed_maps(checkpoint, job.maps)
-    plan = make_plan(job.rig, len(maps))
     say(0.1, "Optimising")
     with job.timed("optimise"):
-        problem, state = resumed_problem(checkpoint, maps, job.camera, plan)
-        optimum = _optimise(job, problem, state, _reporter(job, say, 0.1), checkpoint.stage)
+        problem, state = resumed_problem(
+            checkpoint, maps, job.camera, job.rig, job.layout(len(maps))
+        )
+        result, predicted = _optimise(
+            job, problem, state, _reporter(job, say, 0.1), last_stage=checkpoint.last_stage
+        )
     left_out = [
         LeftOut(name=m.name, reason="it was not part of the calibration resumed")
         for m in job.maps
         if m not in maps
     ]
-    return Found(maps, left_out, [], optimum)
+    return Optimised(maps, left_out, [], result, predicted)
 
 
-def _own_surfaces(job: Job, say: Progress) -> Found:
+def _own_surfaces(job: Job, say: Progress) -> Optimised:
     say(0.05, "Searching for a start")
     with job.timed("start"):
         maps, starts, left_out = _starts(job)
-        plan = make_plan(job.rig, len(maps))
-        if len(maps) > 1 and plan.blocks["projector_pose"] != "per_frame":
-            starts = common_start(maps, starts, job.camera)
+        layout = job.layout(len(maps))
+        if len(maps) > 1 and layout.sharing("projector_pose") != "per_frame":
+            share_focal = layout.sharing("focal") != "per_frame"
+            starts = common_start(maps, starts, job.camera, share_focal=share_focal)
     say(0.4, "Optimising")
     notes = list(dict.fromkeys(note for s in starts for note in s.notes))
     with job.timed("optimise"):
-        problem, state = separate_surfaces(maps, starts, job.camera, plan, job.law, job.options)
-        optimum = _optimise(job, problem, state, _reporter(job, say, 0.4))
-    return Found(maps, left_out, notes, optimum)
+        predicted: list[Direction] = []
+
+        def solve(starts: Sequence[Start]) -> OptimisationResult:
+            problem, state = separate_surfaces(
+                maps, starts, job.camera, job.rig, layout, job.law, job.options
+            )
+            result, predicted[:] = _optimise(job, problem, state, _reporter(job, say, 0.4))
+            return result
+
+        result = with_restarts(maps, starts, job.camera, solve)
+    return Optimised(maps, left_out, notes, result, predicted)
 
 
-def _shared_surface(job: Job, say: Progress) -> Found:
+def _shared_surface(job: Job, say: Progress) -> Optimised:
     """Solve every frame alone, register them, and optimise all with one surface."""
     alone, left_out = _solved_alone(job, say)
     say(0.5, "Registering the frames")
     with job.timed("registration"):
-        placed = _place(job, alone)
-    kept = [k for k, p in enumerate(placed) if p.reliable]
+        registered = _register(job, alone)
+    kept = [k for k, p in enumerate(registered) if p.reliable]
     left_out += [
         LeftOut(name=alone[k].name, reason=_named(p.reason, alone))
-        for k, p in enumerate(placed)
+        for k, p in enumerate(registered)
         if not p.reliable
     ]
     notes = list(dict.fromkeys(note for k in kept for note in alone[k].notes))
     say(0.6, "Optimising all frames")
     with job.timed("optimise"):
-        found = _optimise_joint(job, [alone[k] for k in kept], [placed[k] for k in kept], say)
-    return replace(found, left_out=left_out + found.left_out, notes=notes + found.notes)
+        done = _optimise_joint(job, [alone[k] for k in kept], [registered[k] for k in kept], say)
+    return replace(done, left_out=left_out + done.left_out, notes=notes + done.notes)
 
 
-def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameStart], list[LeftOut]]:
+def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameSolution], list[LeftOut]]:
     """Start and solve every frame alone; name those that cannot be used."""
     say(0.05, "Searching for a start")
     with job.timed("start"):
         maps, starts, left_out = _starts(job)
     say(0.3, "Solving every frame alone")
     with job.timed("frames"):
-        plan = make_plan(job.rig, len(maps))
-        return solve_alone(maps, starts, job.camera, plan, job.law, job.options), left_out
+        layout = job.layout(len(maps))
+        alone = solve_alone(maps, starts, job.camera, job.rig, layout, job.law, job.options)
+    return alone, left_out
 
 
 def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
     """Start the frames that can be used; name the others."""
     sound, faulty = without_faults(job.maps, job.rig)
     unique, repeated = without_repeats(sound)
-    maps, starts, failed = usable_starts(unique, job.camera, job.rig, job.law, job.options)
+    maps, starts, failed = usable_starts(
+        unique, job.camera, job.rig, job.layout(len(unique)), job.law, job.options
+    )
     return maps, starts, [*faulty, *repeated, *failed]
 
 
-def _place(job: Job, alone: list[FrameStart]) -> list[Registration]:
+def _register(job: Job, alone: Sequence[FrameSolution]) -> list[Registration]:
     if job.options.cameras == "identity":
         return at_identity(len(alone))
-    rays = job.camera.rays(job.camera.pixel_grid())
-    images = [RangeImage(rays, a.range, job.camera) for a in alone if a.range is not None]
+    images = [RangeImage(job.camera.grid_rays, a.range, job.camera)
+              for a in alone if a.range is not None]  # fmt: skip
     return register_frames(images, seed=job.options.seed)
 
 
-def _named(reason: str, alone: list[FrameStart]) -> str:
+def _named(reason: str, alone: Sequence[FrameSolution]) -> str:
     """Replace frame numbers of a registration's reason by names."""
     for k, frame in reversed(list(enumerate(alone))):
         reason = reason.replace(f"against frame {k}:", f"against {frame.name}:")
@@ -177,47 +199,55 @@ def _named(reason: str, alone: list[FrameStart]) -> str:
 
 
 def _optimise_joint(
-    job: Job, alone: list[FrameStart], placed: list[Registration], say: Progress
-) -> Found:
+    job: Job, alone: list[FrameSolution], registered: list[Registration], say: Progress
+) -> Optimised:
     """Optimise all frames; leave out one that contradicts the others and try again."""
     left_out: list[LeftOut] = []
     while True:
-        plan = make_plan(job.rig, len(alone))
-        problem, state = joint_problem(alone, seen_from_first(placed), plan, job.law)
-        optimum = _optimise(job, problem, state, _reporter(job, say, 0.6))
-        found = agreements(alone, optimum) if len(alone) > 1 else []
-        wrong = None if optimum.outcome is Outcome.INTERRUPTED else worst(found)
+        problem, state = _joint_problem(job, alone, seen_from_first(registered))
+        result, predicted = _optimise(job, problem, state, _reporter(job, say, 0.6))
+        judged = consistencies(alone, result) if len(alone) > 1 else []
+        wrong = None if result.outcome is Outcome.INTERRUPTED else worst(judged)
         if wrong is None:
             break
-        left_out.append(LeftOut(name=alone[wrong].name, reason=found[wrong].reason))
+        left_out.append(LeftOut(name=alone[wrong].name, reason=judged[wrong].reason))
         alone = [a for k, a in enumerate(alone) if k != wrong]
-        placed = [p for k, p in enumerate(placed) if k != wrong]
-    doubts = [f"do not rely on frame {a.name}: {a.reason}" for a in found if a.doubtful]
+        registered = [p for k, p in enumerate(registered) if k != wrong]
+    doubts = [f"do not rely on frame {c.name}: {c.reason}" for c in judged if c.doubtful]
     names = {a.name for a in alone}
-    return Found([m for m in job.maps if m.name in names], left_out, doubts, optimum)
+    maps = [m for m in job.maps if m.name in names]
+    return Optimised(maps, left_out, doubts, result, predicted)
+
+
+def _joint_problem(
+    job: Job, alone: Sequence[FrameSolution], registered: Sequence[Registration]
+) -> tuple[Problem, State]:
+    """Build the joint problem on the kind of surface that the options ask for."""
+    layout = job.layout(len(alone))
+    return joint_problem(alone, registered, job.rig, layout, job.law)
 
 
 def _optimise(
-    job: Job, problem: Problem, state: State, report: OnIteration, stage: int = 0
-) -> Optimum:
+    job: Job, problem: Problem, state: State, report: OnIteration, *, last_stage: bool = False
+) -> tuple[OptimisationResult, list[Direction]]:
     """Optimise, with a surface that grows to where moving cameras look."""
     with job.timed("observability"):
-        job.foreseen[:] = foreseen_directions(problem, state, job.options.finish)
-    extra = drift_prior(job.rig, problem.plan)
+        predicted = predicted_directions(problem, state, job.options.finish)
     job.history.begin(problem, state)
     report = job.history.recording(report)
-    optimum = optimise(problem, state, job.options, extra, report, stage)
+    result = minimise(problem, state, job.options, report, last_stage=last_stage)
     for _ in range(_MAX_EXTENSIONS):
-        if problem.plan.surface != "shared" or optimum.outcome is not Outcome.CONVERGED:
+        shared = problem.layout.frames > 1 and problem.layout.surfaces == 1
+        if not shared or result.outcome is not Outcome.CONVERGED:
             break
-        grown = extended(optimum)
+        grown = extended(result)
         if grown is None:
             break
-        trace = optimum.trace
+        trace = result.trace
         job.history.go_on(grown[0])
-        optimum = optimise(*grown, job.options, extra, report)
-        optimum = replace(optimum, trace=_continued(trace, optimum.trace))
-    return optimum
+        result = minimise(*grown, job.options, report)
+        result = replace(result, trace=_continued(trace, result.trace))
+    return result, predicted
 
 
 def _continued(before: list[TraceRow], after: list[TraceRow]) -> list[TraceRow]:
@@ -240,13 +270,13 @@ def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
     return report
 
 
-def finish(job: Job, found: Found, say: Progress) -> Fit:
+def infer(job: Job, done: Optimised, say: Progress) -> Fit:
     """Smooth the surface to be reported and tell how well everything is known."""
     say(0.0, "Computing standard deviations")
     with job.timed("surface"):
-        reported = smooth_surfaces(found.optimum, job.options)
+        reported = smooth_surfaces(done.result, job.options)
     with job.timed("uncertainty"):
-        known = uncertainty(found.optimum, reported, job.options.jackknife)
+        known = uncertainty(done.result, reported, job.options.jackknife)
     given = [m.name for m in job.maps]
-    return Fit(job.law, found.maps, found.left_out, given, found.optimum, reported, known,
-               found.notes, job.timings, job.foreseen, job.history.snapshots)  # fmt: skip
+    return Fit(job.law, done.maps, done.left_out, given, done.result, reported, known,
+               done.notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip

@@ -13,7 +13,6 @@ from mitsuba_endo.geometry.transforms import (
 
 from .correspondences import Correspondences
 from .epipolar import Bearings, Residuals, bearings, jacobian, residuals
-from .triangulate import in_front
 from .vectors import Vectors
 
 _OUT_OF_RANGE_PX = 1e3  # residual of a coordinate that the law cannot produce at the tried focal
@@ -59,10 +58,6 @@ class State:
     def r(self) -> Vectors:
         """(N,) residuals, pattern pixels; coordinates that the law cannot produce count as far."""
         return np.where(np.isfinite(self.at.r), self.at.r, _OUT_OF_RANGE_PX)
-
-    def in_front(self, noise_px: float) -> Vectors:
-        """Return +1 in front of camera and projector, -1 behind, 0 undecided (see there)."""
-        return in_front(self.pose, self.seen, self.at, noise_px / self.projector.focal)
 
 
 def evaluate(

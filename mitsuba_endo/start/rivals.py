@@ -43,6 +43,9 @@ class Rival:
     """Robust epipolar cost over that of the given calibration, both at their minima."""
     decided: bool
     """Whether the residuals prefer the given calibration by more than noise can make."""
+    better: bool
+    """Whether they prefer this one by more than noise can make: the given one was no minimum of
+    the whole."""
     planar: bool
     """Whether the surface is nearly one plane under the given calibration."""
 
@@ -99,9 +102,11 @@ def _rated(
     out = []
     for m in minima:
         cost = loss.cost(m.state.r)
-        decided = cost - lowest > cost_margin(given.r, m.state.r, loss)
+        margin = cost_margin(given.r, m.state.r, loss)
+        decided, better = cost - lowest > margin, lowest - cost > margin
         if m.same_as(itself) or (decided and cost > SIMILAR_COST * lowest):
             continue
         found = m.candidate
-        out.append(Rival(found.projector_from_camera, found.focal, cost / lowest, decided, planar))
+        ratio = cost / lowest
+        out.append(Rival(found.projector_from_camera, found.focal, ratio, decided, better, planar))
     return sorted(out, key=lambda r: r.cost_ratio)

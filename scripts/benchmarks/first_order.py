@@ -8,14 +8,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mitsuba_endo.records.calibration import TraceRow
-from mitsuba_endo.solve.cost.objective import Objective, evaluate
-from mitsuba_endo.solve.cost.problem import Problem
-from mitsuba_endo.solve.optimise.optimum import Optimum
-from mitsuba_endo.solve.optimise.run import optimise
+from mitsuba_endo.solve.costs.problem import Problem, evaluate
+from mitsuba_endo.solve.frames.initialisation import start_frame
+from mitsuba_endo.solve.frames.single import separate_surfaces
+from mitsuba_endo.solve.minimisers.minimise import minimise
+from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.prepare.frames import start_frame
-from mitsuba_endo.solve.prepare.single import separate_surfaces
-from mitsuba_endo.solve.unknowns.plan import make_plan
+from mitsuba_endo.solve.unknowns.layout import make_layout
 from mitsuba_endo.solve.unknowns.state import State
 
 from .report import Figure, timed
@@ -37,19 +36,21 @@ def run(quick: bool) -> list[Figure]:
 def _compare(scene: Scene, start: StartName) -> list[Figure]:
     options = Options(start=start, plane_distance=PLANE_MM / scene.baseline)
     law = scene.rig.projector.law
-    first = start_frame(scene.map, scene.camera, scene.rig, law, options)
-    plan = make_plan(scene.rig, 1)
-    problem, state = separate_surfaces([scene.map], [first], scene.camera, plan, law, options)
-    optimise(problem, state, options)  # compiles
+    layout = make_layout(scene.rig, 1)
+    first = start_frame(scene.map, scene.camera, scene.rig, layout, law, options)
+    problem, state = separate_surfaces(
+        [scene.map], [first], scene.camera, scene.rig, layout, law, options
+    )
+    minimise(problem, state, options)  # compiles
     slow = replace(options, solver="adam")
-    optimise(problem, state, replace(slow, adam_iterations=100))
-    runs = [timed(lambda: optimise(problem, state, options)) for _ in range(5)]
-    adam_time, adam = timed(lambda: optimise(problem, state, slow))
+    minimise(problem, state, replace(slow, adam_iterations=100))
+    runs = [timed(lambda: minimise(problem, state, options)) for _ in range(5)]
+    adam_time, adam = timed(lambda: minimise(problem, state, slow))
     # On both sides of the long run, since the machine's load changes.
-    runs += [timed(lambda: optimise(problem, state, options)) for _ in range(5)]
+    runs += [timed(lambda: minimise(problem, state, options)) for _ in range(5)]
     newton_time, newton = float(np.median([t for t, _ in runs])), runs[0][1]
     arrivals = [time_of_arrival(problem, state, options, newton) for _ in range(5)]
-    ratio = newton.objective.cost(adam.evaluation) / newton.cost
+    ratio = adam.evaluation.cost(newton.noise) / newton.cost
     figure = partial(Figure, NAME)
     within = time_of_arrival(problem, state, slow, newton) / float(np.median(arrivals))
     return [
@@ -65,21 +66,22 @@ def _compare(scene: Scene, start: StartName) -> list[Figure]:
     ]  # fmt: skip
 
 
-def time_of_arrival(problem: Problem, state: State, options: Options, optimum: Optimum) -> float:
+def time_of_arrival(
+    problem: Problem, state: State, options: Options, optimum: OptimisationResult
+) -> float:
     """Return the seconds until the loss is within 1 % of the optimum's, both under its scale.
 
     Adam looks at its loss every 100 iterations only; the looks here are not counted.
     """
-    objective: Objective = optimum.objective
     arrived: list[float] = []
     looking = 0.0
 
     def look(row: TraceRow, at: State) -> None:
         nonlocal looking
-        seconds, cost = timed(lambda: objective.cost(evaluate(problem, at)))
+        seconds, cost = timed(lambda: evaluate(problem, at).cost(optimum.noise))
         if not arrived and cost <= _WITHIN * optimum.cost:
             arrived.append(row.seconds - looking)
         looking += seconds
 
-    optimise(problem, state, options, on_iteration=look)
+    minimise(problem, state, options, on_iteration=look)
     return arrived[0] if arrived else float("nan")

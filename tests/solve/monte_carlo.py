@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_endo.solve.cost.normal import NormalEquations
-from mitsuba_endo.solve.cost.objective import evaluate
-from mitsuba_endo.solve.cost.problem import Problem
-from mitsuba_endo.solve.optimise.polish import smooth_surfaces
-from mitsuba_endo.solve.optimise.run import optimise
+from mitsuba_endo.solve.costs.problem import Problem, evaluate
+from mitsuba_endo.solve.elimination.normal import NormalEquations
+from mitsuba_endo.solve.inference.covariance import uncertainty
+from mitsuba_endo.solve.minimisers.minimise import minimise
+from mitsuba_endo.solve.minimisers.smoothing import smooth_surfaces
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.statistics.uncertainty import uncertainty
+from mitsuba_endo.solve.surfaces.lattice import Lattice
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import Rig, bumpy_sheet, lopsided_camera, random_rig, with_noise, with_outliers
 from tests.solve.problems import NOISE, errors, problem_of, small_rig
@@ -74,16 +74,17 @@ def _sample(cases: list[tuple[Rig, int]], outliers: float) -> Sample:
 
 def _measure(rig: Rig, seed: int, outliers: float) -> list[NDArray[np.float64]]:
     noisy = with_outliers(with_noise(rig, NOISE, seed), outliers, seed)
-    optimum = optimise(*problem_of([noisy]), Options())
-    reported = smooth_surfaces(optimum, Options())
-    known = uncertainty(optimum, reported, jackknife=True)
+    result = minimise(*problem_of([noisy]), Options())
+    reported = smooth_surfaces(result, Options())
+    known = uncertainty(result, reported, jackknife=True)
     assert known.jackknife is not None
-    lattice = optimum.objective.problem.surfaces[0].lattice
+    lattice = result.problem.surfaces[0]
+    assert isinstance(lattice, Lattice)
     true_rho = _true_rho(rig, lattice.directions)
     return [
-        errors(optimum, rig), np.sqrt(np.diag(known.formal)), np.sqrt(np.diag(known.jackknife)),
+        errors(result, rig), np.sqrt(np.diag(known.formal)), np.sqrt(np.diag(known.jackknife)),
         np.array(known.sigma / NOISE), _bound(*problem_of([rig])),
-        reported.state.rho[0] / true_rho - 1, known.rho_std[0] / true_rho,
+        reported.state.surfaces[0] / true_rho - 1, known.surface_std[0] / true_rho,
     ]  # fmt: skip
 
 
@@ -105,13 +106,13 @@ def _true_rho(rig: Rig, directions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _bound(problem: Problem, state: State) -> NDArray[np.float64]:
     """Return the Cramer-Rao bound (G,) for a lattice surface of which nothing is known."""
-    plan, lattice = problem.plan, problem.surfaces[0].lattice
-    normal = NormalEquations.empty([lattice.size], [lattice.bandwidth], plan.columns)
+    layout = problem.layout
+    normal = NormalEquations.empty(problem.surfaces, layout.columns)
     lin = evaluate(problem, state).linearisation(0)
     normal.add_frame(
-        0, lin, np.zeros_like(lin.q), np.ones(len(lin.hit)), plan.local_to_global(state, 0)
+        0, lin, np.zeros_like(lin.values), np.ones(len(lin.hit)), layout.local_from_global(state, 0)
     )
-    operator = problem.surfaces[0].prior.operator
+    operator = problem.smoothness[0].bending.operator
     block = normal.surfaces[0]
     block.A = block.A + 1e-6 * (operator.T @ operator)  # holds vertices without data
     return NOISE * np.sqrt(np.diag(np.linalg.inv(normal.reduce().S)))

@@ -6,18 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, tangent_basis
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.rig import Rig as RigFile
-from mitsuba_endo.solve.cost.problem import Problem
-from mitsuba_endo.solve.optimise.optimum import Optimum
-from mitsuba_endo.solve.optimise.run import optimise
+from mitsuba_endo.solve.costs.problem import Problem
+from mitsuba_endo.solve.frames.single import separate_surfaces
+from mitsuba_endo.solve.minimisers.minimise import minimise
+from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.prepare.single import separate_surfaces
-from mitsuba_endo.solve.unknowns.plan import Plan, make_plan
-from mitsuba_endo.solve.unknowns.state import INTRINSICS, State, intrinsics_vector
+from mitsuba_endo.solve.unknowns.layout import make_layout
+from mitsuba_endo.solve.unknowns.state import State
 from mitsuba_endo.start.known import known_start
 from mitsuba_endo.start.result import Start
 from tests.rigs import Rig, Surface, bumpy_sheet, cast, lopsided_camera
@@ -56,29 +56,50 @@ def true_start(rig: Rig) -> Start:
     return known_start(rig.q, rig.camera, rig.projector, rig.projector_from_camera)
 
 
-def problem_of(rigs: list[Rig], plan: Plan | None = None) -> tuple[Problem, State]:
-    """The problem of frames with a surface each, at the truth up to the surfaces' noise."""
-    plan = plan or make_plan(rig_file(rigs[0]), len(rigs))
+def problem_of(
+    rigs: list[Rig],
+    record: RigFile | None = None,
+    *,
+    starts: list[Start] | None = None,
+    options: Options | None = None,
+) -> tuple[Problem, State]:
+    """The problem of frames with a surface each, at the truth up to the surfaces' noise.
+
+    ``record`` replaces what the first rig's file would say, ``starts`` the true calibrations.
+    """
+    record = record or rig_file(rigs[0])
     maps = [map_of(r, f"{k}.npz") for k, r in enumerate(rigs)]
-    starts = [true_start(r) for r in rigs]
-    law = rigs[0].projector.law
-    return separate_surfaces(maps, starts, rigs[0].camera, plan, law, Options())
+    starts = starts or [true_start(r) for r in rigs]
+    law, layout = rigs[0].projector.law, make_layout(record, len(rigs))
+    return separate_surfaces(
+        maps, starts, rigs[0].camera, record, layout, law, options or Options()
+    )
 
 
-def solved(rig: Rig, **options: Any) -> Optimum:
-    """The optimum of one frame, from the truth."""
-    return optimise(*problem_of([rig]), Options(**options))
+def solved(rig: Rig, **options: Any) -> OptimisationResult:
+    """The result of one frame, from the truth."""
+    return minimise(*problem_of([rig]), Options(**options))
 
 
-def errors(optimum: Optimum, truth: Rig) -> NDArray[np.float64]:
-    """Return estimate minus truth (G,) of a single frame's unknowns, in the solver's charts."""
+def true_intrinsics(projector: ProjectorModel) -> dict[str, NDArray[np.float64]]:
+    """What the blocks of the intrinsics hold of a projector."""
+    return {
+        "focal": np.log([projector.focal]),
+        "centre": np.array(projector.centre, float),
+        "aspect": np.log([projector.aspect]),
+        "distortion": np.array(projector.distortion.coefficients, float),
+    }
+
+
+def errors(result: OptimisationResult, truth: Rig) -> NDArray[np.float64]:
+    """Return estimate minus truth (G,) of a single frame's unknowns, in the solver's tangents."""
     out = []
-    pose, exact = optimum.state.projector_from_camera[0], truth.projector_from_camera
-    vector, known = optimum.state.intrinsics[0], intrinsics_vector(truth.projector)
-    for name, _ in optimum.objective.problem.plan.slots:
+    state, known = result.state, true_intrinsics(truth.projector)
+    pose, exact = state.at("projector_pose", 0), truth.projector_from_camera
+    for name, _ in result.problem.layout.slots:
         if name == "projector_pose":
             out.append(Rotation.from_matrix(pose.R @ exact.R.T).as_rotvec())
             out.append(tangent_basis(pose.t).T @ (pose.t - exact.t / truth.baseline))
         else:
-            out.append((vector - known)[INTRINSICS[name]])
+            out.append(state.at(name, 0) - known[name])
     return np.concatenate(out)

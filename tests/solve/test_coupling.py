@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.cost.coupling import Coupling
+from mitsuba_endo.solve.elimination.coupling import Coupling
 
 V, G = 37, 8
 

@@ -5,9 +5,8 @@ import pytest
 
 from mitsuba_endo.records.calibration import Snapshot
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.history import coarsened
-from mitsuba_endo.solve.statistics.uncertainty import shared_modes
-from mitsuba_endo.solve.unknowns.lattice import lattice_over
+from mitsuba_endo.solve.inference.covariance import shared_modes
+from mitsuba_endo.solve.surfaces.lattice import lattice_over
 from tests.rigs import with_noise
 from tests.solve.monte_carlo import FIELD
 from tests.solve.problems import NOISE, map_of, rig_file, small_rig
@@ -42,7 +41,7 @@ def test_coarse_lattice_keeps_its_shape():
     x, y = angles[~hole].T
     rays = np.stack([x, y, np.ones_like(x)], -1)
     lattice = lattice_over(rays / np.linalg.norm(rays, axis=1)[:, None], 0.012)
-    kept, faces = coarsened(lattice, 300)
+    kept, faces = lattice.coarsened(300)
     assert 150 < len(kept) < 400
     assert faces.max() == len(kept) - 1
     corners = lattice.coordinates[kept][faces]
@@ -51,7 +50,7 @@ def test_coarse_lattice_keeps_its_shape():
     assert np.ptp(np.abs(area)) < 1e-12
     inside = np.hypot(*(corners.mean(1) - [0.2, -0.1]).T) < 0.07
     assert not inside.any()
-    whole, all_faces = coarsened(lattice, 10 * lattice.size)
+    whole, all_faces = lattice.coarsened(10 * lattice.size)
     assert len(whole) == lattice.size
     # A lone missing cell has its four corners all the same.
     assert {*map(tuple, lattice.faces)} <= {*map(tuple, all_faces)}

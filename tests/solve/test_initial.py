@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.solve.prepare.initial import (
+from mitsuba_endo.solve.frames.initial import (
     MAX_VERTICES,
     PER_VERTEX,
     cell_size,
@@ -13,7 +13,7 @@ from mitsuba_endo.solve.prepare.initial import (
     pixel_angle,
     smooth_samples,
 )
-from mitsuba_endo.solve.unknowns.lattice import lattice_over
+from mitsuba_endo.solve.surfaces.lattice import lattice_over
 from tests.rigs import lopsided_camera
 from tests.solve.problems import SHEET, small_rig
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.unknowns.lattice import (
+from mitsuba_endo.solve.surfaces.lattice import (
     Lattice,
     equidistant_coordinates,
     equidistant_direction,
@@ -99,6 +99,65 @@ def test_bandwidth_bounds_what_is_coupled(lattice: Lattice):
     # Numbered along the short side: three rows of it at most.
     short = int(np.ptp(lattice.ij, axis=0).min()) + 1
     assert lattice.bandwidth <= 3 * short
+
+
+def test_bending_is_in_pattern_pixels(lattice: Lattice):
+    """Oracle: second differences times focal length and baseline, and no offset."""
+    bending = lattice.bending(330.0)
+    rho = np.random.default_rng(5).uniform(0.05, 0.3, lattice.size)
+    found = bending.operator @ rho + bending.offset
+    np.testing.assert_allclose(found, 330 * (lattice.second_differences() @ rho), rtol=1e-12)
+
+
+def test_slopes_are_how_far_vertices_move(lattice: Lattice):
+    """Oracle: central differences of the vertices' positions."""
+    rho = np.random.default_rng(6).uniform(0.05, 0.3, lattice.size)
+    ends = [lattice.vertices(rho + h) for h in (1e-7, -1e-7)]
+    moved = np.linalg.norm(ends[0] - ends[1], axis=1) / 2e-7
+    np.testing.assert_allclose(np.abs(lattice.slopes(rho)), moved, rtol=1e-6)
+
+
+def test_steps_never_lead_behind_the_centre(lattice: Lattice):
+    """Oracle: the step where it stays in front, a twentieth of the median elsewhere."""
+    rho = np.random.default_rng(7).uniform(0.1, 0.2, lattice.size)
+    step = np.where(np.arange(lattice.size) % 5 == 0, -1.0, 0.03)
+    found = lattice.retract(rho, step)
+    np.testing.assert_array_equal(found[step > 0], (rho + step)[step > 0])
+    np.testing.assert_allclose(found[step < 0], np.median(rho) / 20)
+
+
+def test_bridges_over_a_depth_step(lattice: Lattice):
+    """Oracle: faces with corners on both sides of a step to twice the range, and no others."""
+    near = lattice.ij[:, 0] < np.median(lattice.ij[:, 0])
+    rho = np.where(near, 0.2, 0.1)
+    side = near[lattice.faces]
+    np.testing.assert_array_equal(lattice.bridges(rho), side.any(1) & ~side.all(1))
+    assert not lattice.bridges(np.full(lattice.size, 0.1)).any()
+
+
+def test_record_round_trip(lattice: Lattice):
+    """Oracle: the lattice itself."""
+    again = Lattice.from_record(lattice.record())
+    assert again.cell == lattice.cell
+    np.testing.assert_array_equal(again.ij, lattice.ij)
+    np.testing.assert_array_equal(again.faces, lattice.faces)
+
+
+@pytest.mark.parametrize("room", [30, 10_000])
+def test_coarsened_faces_lie_on_the_surface(lattice: Lattice, room: int):
+    """Oracle: squares of n cells a side whose corners are vertices, as many as there is room."""
+    kept, faces = lattice.coarsened(room)
+    n = max(1, int(np.ceil(np.sqrt(lattice.size / room))))
+    assert len(kept) <= 2 * room
+    assert len(faces) > 0
+    at = lattice.ij[kept][faces]
+    assert (np.ptp(at, axis=1) == n).all()
+    e, f = at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]
+    assert (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] == n * n).all()
+    if n == 1:
+        np.testing.assert_array_equal(kept, np.arange(lattice.size))
+        # A missing cell is covered too where its four corners belong to its neighbours.
+        assert {tuple(f) for f in faces} >= {tuple(f) for f in lattice.faces}
 
 
 def test_nearest(lattice: Lattice):

@@ -7,24 +7,29 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.solve.results.redundancy import Look, alike, image_motion, redundancy_warnings
+from mitsuba_endo.solve.reporting.redundancy import (
+    FrameView,
+    alike,
+    image_motion,
+    redundancy_warnings,
+)
 from tests.rigs import lopsided_camera
 
 CAMERA = lopsided_camera(108, 84)
 RANGE = 12.0
 
 
-def a_look(name: str = "a", seed: int = 0, noise: float = 0.2) -> Look:
+def a_look(name: str = "a", seed: int = 0, noise: float = 0.2) -> FrameView:
     """A sphere about the camera that spans 320 x 250 pattern pixels."""
     y, x = np.mgrid[:84, :108]
     q = np.stack([40 + 3.0 * x, 30 + 3.0 * y], -1)
     q += noise * np.random.default_rng(seed).standard_normal(q.shape)
     points = RANGE * CAMERA.rays(CAMERA.pixel_grid())
     map_ = CorrespondenceMap(q.astype(np.float32), name)
-    return Look(map_, points, RigidTransform.identity(), 0)
+    return FrameView(map_, points, RigidTransform.identity(), 0)
 
 
-def shifted(look: Look, pixels: float) -> Look:
+def shifted(look: FrameView, pixels: float) -> FrameView:
     return replace(look, map=CorrespondenceMap(look.map.q + np.float32(pixels), look.map.name))
 
 
@@ -67,6 +72,31 @@ def test_maps_with_little_in_common() -> None:
     left.map.q[:, 72:] = np.nan
     right.map.q[:, :60] = np.nan
     assert not alike(left, right, CAMERA, 0.2)
+
+
+def with_object(view: FrameView, left: int) -> FrameView:
+    """An object of a seventh of the image's width and height before the wall, 15 px off it."""
+    q = view.map.q.copy()
+    q[36:48, left : left + 15] += 15
+    return replace(view, map=CorrespondenceMap(q, view.map.name))
+
+
+@pytest.mark.parametrize("surface", [0, 1])
+def test_small_object_that_moves_is_seen(surface: int) -> None:
+    """Oracle: it covers 2 % of the image before and after; standing still it changes nothing."""
+    before = with_object(a_look(), 20)
+    still, moved = (replace(with_object(a_look("b", 1), x), surface=surface) for x in (20, 60))
+    assert alike(before, still, CAMERA, 0.2)
+    assert not alike(before, moved, CAMERA, 0.2)
+
+
+@pytest.mark.parametrize("surface", [0, 1])
+def test_gross_errors_do_not_make_frames_differ(surface: int) -> None:
+    """Oracle: the same view, a tenth of whose correspondences are decoded wrongly."""
+    other = replace(a_look("b", 1), surface=surface)
+    wrong = np.random.default_rng(4).random(other.map.q.shape[:2]) < 0.1
+    other.map.q[wrong] += 40
+    assert alike(a_look(), other, CAMERA, 0.2)
 
 
 def test_every_repeat_is_named_once() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.solve.results.scale import Unit, resolve_unit
+from mitsuba_endo.solve.reporting.scale import Unit, resolve_unit
 from tests.solve.problems import POSE, SHEET, rig_file, small_rig
 
 RIG = small_rig("pinhole")

@@ -9,14 +9,12 @@ import pytest
 
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.optimise.run import optimise
+from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.prepare.single import separate_surfaces
-from mitsuba_endo.solve.unknowns.plan import make_plan
 from mitsuba_endo.start.known import known_start
 from mitsuba_endo.start.search import search_start
 from tests.rigs import Rig, Surface, plane, with_noise
-from tests.solve.problems import map_of, rig_file, small_rig
+from tests.solve.problems import map_of, problem_of, rig_file, small_rig
 
 pytestmark = pytest.mark.usefixtures("llvm")
 
@@ -57,10 +55,8 @@ def test_solver_goes_along_a_valley() -> None:
         start = known_start(
             rig.q, rig.camera, rig.projector.with_(focal=factor * 330), rig.projector_from_camera
         )
-        plan = make_plan(rig_file(rig), 1)
-        problem = separate_surfaces([map_of(rig)], [start], rig.camera, plan, "pinhole", Options())
-        ends.append(optimise(*problem, Options()))
-    focals = [float(np.exp(end.state.intrinsics[0][0])) for end in ends]
+        ends.append(minimise(*problem_of([rig], starts=[start]), Options()))
+    focals = [end.state.focals[0] for end in ends]
     assert all(end.outcome is Outcome.CONVERGED for end in ends)
     assert focals[1] == pytest.approx(focals[0], rel=0.01)
 

@@ -10,7 +10,7 @@ from mitsuba_endo.records.solution import (
     ProjectorEstimate,
     Solution,
 )
-from mitsuba_endo.solve.results.verdict import verdict
+from mitsuba_endo.solve.reporting.verdict import verdict
 from tests.solve.problems import POSE
 
 MEASURED = PoseEstimate.of(POSE, std=[1e-3, 2e-3, 1e-3, 0.01, 0.02, 0.01])

@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.solve.calibrate import calibrate
+from mitsuba_endo.solve.frames.weights import balanced
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.prepare.weights import balanced
 from tests.rigs import with_noise
 from tests.solve.problems import map_of, rig_file, small_rig
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,26 +13,26 @@ from .registry import CAMERAS
 
 @dataclass(frozen=True, eq=False)
 class CameraModel:
-    """Camera intrinsics, known and fixed in a calibration."""
+    """Camera intrinsics."""
 
     model: str
     """Name in :data:`CAMERAS`."""
     width: int
     height: int
-    K: NDArray[np.float64]
-    """(3, 3) camera matrix without skew, pixels."""
+    K: Any
+    """(3, 3) camera matrix without skew, pixels: an array, or nested tuples of Dr.Jit scalars."""
     distortion: tuple[Array, ...] = ()
     """Coefficients in OpenCV order."""
 
     def project_xyz(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         """Project directions in the camera frame to pixels."""
         a, b = CAMERAS[self.model].normalise(self.distortion, x, y, z)
-        return self.K[0, 0] * a + self.K[0, 2], self.K[1, 1] * b + self.K[1, 2]
+        return self.K[0][0] * a + self.K[0][2], self.K[1][1] * b + self.K[1][2]
 
     def direction_uv(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """Return ray directions (not unit length) in the camera frame of pixels (u, v)."""
-        a = (u - self.K[0, 2]) / self.K[0, 0]
-        b = (v - self.K[1, 2]) / self.K[1, 1]
+        a = (u - self.K[0][2]) / self.K[0][0]
+        b = (v - self.K[1][2]) / self.K[1][1]
         return CAMERAS[self.model].direction(self.distortion, a, b)
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

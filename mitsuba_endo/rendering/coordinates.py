@@ -1,0 +1,96 @@
+"""R(S, C, P) at one pixel: from a camera ray over the surface to the projector coordinate.
+
+The only place where a ray meets a triangle and a point becomes a pattern coordinate. Components are
+Dr.Jit scalars of one entry a pixel; what is differentiated is up to whoever made them.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from ..geometry.cameras import CameraModel
+from ..geometry.transforms import RigidTransform
+from .untyped import dr, mi
+
+
+class Projects(Protocol):
+    """What takes a direction in the projector's frame to a pattern coordinate."""
+
+    def project_xyz(self, x: Any, y: Any, z: Any) -> tuple[Any, Any]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class FrameModel:
+    """Camera C and projector P of one frame; values of NumPy or of Dr.Jit."""
+
+    camera: CameraModel
+    world_from_camera: Any
+    """:class:`RigidTransform` or :class:`Pose`."""
+    projector_from_camera: Any
+    projector: Projects
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """x_out = exp([turn]x) R x_in + t + shift to first order, on Dr.Jit vectors."""
+
+    R: Any
+    """(3, 3) matrix."""
+    t: Any
+    """Translation, ``shift`` included."""
+    turn: Any = None
+    """Rotation vector, zero in value, whose derivative is that of the rotation; None = fixed."""
+
+    @classmethod
+    def of(cls, pose: RigidTransform, tangent: Any = ()) -> "Pose":
+        """Lift a pose; ``tangent`` holds six scalars (turn, shift) of value zero, or none.
+
+        Values become opaque, so that kernels are not compiled anew for each pose.
+        """
+        R = mi.Matrix3d(pose.R.tolist())
+        t = mi.Vector3d(*(mi.Float64(float(x)) for x in pose.t))
+        dr.make_opaque(R, t)
+        if not len(tangent):
+            return cls(R, t)
+        return cls(R, t + mi.Vector3d(*tangent[3:]), mi.Vector3d(*tangent[:3]))
+
+    def rotate(self, direction: Any) -> Any:
+        """Rotate a vector."""
+        turned = self.R @ direction
+        return turned if self.turn is None else turned + dr.cross(self.turn, turned)
+
+
+def plane_distance(origin: Any, direction: Any, corners: Any) -> Any:
+    """Return how far along ``direction`` a ray meets the plane of a triangle, in its lengths.
+
+    s = n . (a - o) / n . w with the normal n = (b - a) x (c - a): differentiable with respect to
+    everything while the triangle that is hit stays the same.
+    """
+    a, b, c = corners
+    normal = dr.cross(b - a, c - a)
+    return dr.dot(normal, a - origin) / dr.dot(normal, direction)
+
+
+def project_along(model: FrameModel, direction: Any, distance: Any) -> tuple[Any, Any, Any]:
+    """Return the coordinate (u, v) of the point ``distance`` along a camera ray, and a mask.
+
+    Args:
+        model: camera and projector.
+        direction: unit ray in the camera's frame.
+        distance: along it.
+
+    Returns:
+        Pattern pixels, and whether the point lies in front of the projector; (u, v) is finite and
+        without meaning where it does not.
+    """
+    pose = model.projector_from_camera
+    # Projection models ignore the length of their argument; over the distance it stays near one.
+    Y = pose.rotate(direction) + pose.t / distance
+    front = Y.z > 0
+    u, v = model.projector.project_xyz(Y.x, Y.y, dr.select(front, Y.z, 1.0))
+    return u, v, front
+
+
+def camera_rays(camera: CameraModel, u: Any, v: Any) -> Any:
+    """Return the unit ray of pixels (u, v), differentiable with respect to the intrinsics."""
+    x, y, z = camera.direction_uv(u, v)
+    return dr.normalize(mi.Vector3d(x, y, z))

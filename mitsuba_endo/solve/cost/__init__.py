@@ -1,1 +1,0 @@
-"""What is minimised: the robust cost, its derivatives and its normal equations."""

@@ -1,0 +1,1 @@
+"""Normal equations, sparse over surfaces and dense over the other unknowns, and their solution."""

@@ -1,0 +1,1 @@
+"""How frames are brought together: one alone, each with its surface, or all on a shared one."""

@@ -1,0 +1,77 @@
+"""Frames solved alone, before they are brought together."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...geometry.cameras import CameraModel
+from ...records.correspondence import CorrespondenceMap
+from ...records.rig import Rig
+from ...records.solution import Outcome
+from ...start.result import Start
+from ..inference.fit import FrameSolution
+from ..minimisers.minimise import minimise
+from ..minimisers.rendered import render_frames
+from ..minimisers.result import USED_WEIGHT, OptimisationResult
+from ..minimisers.smoothing import smooth_surfaces
+from ..options import Options
+from ..surfaces.lattice import Lattice
+from ..unknowns.layout import Layout
+from .restart import with_restarts
+from .single import separate_surfaces
+
+
+def solve_alone(
+    maps: Sequence[CorrespondenceMap],
+    starts: Sequence[Start],
+    camera: CameraModel,
+    rig: Rig,
+    layout: Layout,
+    law: str,
+    options: Options,
+) -> list[FrameSolution]:
+    """Optimise every frame alone, with the blocks that the layout frees.
+
+    Raises:
+        KeyboardInterrupt: the user stopped: there is nothing yet to go on from.
+    """
+
+    def solve(map_: CorrespondenceMap, start: Start) -> OptimisationResult:
+        own = layout.alone()
+        return minimise(
+            *separate_surfaces([map_], [start], camera, rig, own, law, options), options
+        )
+
+    out = []
+    for map_, start in zip(maps, starts, strict=True):
+        result = with_restarts([map_], [start], camera, lambda s, m=map_: solve(m, s[0]))
+        if result.outcome is Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        out.append(frame_solution(result, camera, options, start.notes))
+    return out
+
+
+def frame_solution(
+    result: OptimisationResult, camera: CameraModel, options: Options, notes: list[str]
+) -> FrameSolution:
+    """Keep of the result of one frame alone what the joint solution needs.
+
+    The rest, most of all the scene for the ray tracer, is as large as many input maps.
+    """
+    problem, state = result.problem, result.state
+    (lattice,) = problem.surfaces
+    assert isinstance(lattice, Lattice)
+    registered = options.cameras == "registration"
+    smooth = render_frames(smooth_surfaces(result, options), camera)[0] if registered else None
+    return FrameSolution(
+        observations=problem.observed[0],
+        cell=lattice.cell,
+        points=lattice.vertices(state.surfaces[0]),
+        state=replace(state, surfaces=(np.zeros(0),)),
+        squared=result.evaluation.squared(0),
+        used=result.weights[0] > USED_WEIGHT,
+        information=result.normal_equations().reduce().S / result.noise.sigma**2,
+        range=None if smooth is None else smooth.range,
+        notes=notes,
+    )

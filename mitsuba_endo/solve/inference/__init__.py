@@ -1,0 +1,1 @@
+"""What can be said of a result: covariance, observability, alternative solutions, consistency."""

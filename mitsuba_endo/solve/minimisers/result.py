@@ -1,0 +1,74 @@
+"""Where a minimiser ended."""
+
+import time
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...records.calibration import TraceRow
+from ...records.solution import Outcome
+from ..costs.loss import NoiseScale
+from ..costs.problem import Evaluation, Problem
+from ..elimination.normal import NormalEquations
+from ..unknowns.state import State
+
+USED_WEIGHT = 0.1
+"""Robust weight above which a correspondence counts as used."""
+
+
+@dataclass(frozen=True, eq=False)
+class OptimisationResult:
+    """The last state, with what inference needs."""
+
+    outcome: Outcome
+    evaluation: Evaluation
+    noise: NoiseScale
+    trace: list[TraceRow]
+
+    @property
+    def state(self) -> State:
+        return self.evaluation.state
+
+    @property
+    def problem(self) -> Problem:
+        return self.evaluation.problem
+
+    @cached_property
+    def weights(self) -> list[NDArray[np.float64]]:
+        """Robust weights (N,) of every frame."""
+        return self.evaluation.weights(self.noise)
+
+    @cached_property
+    def cost(self) -> float:
+        """Pattern pixels squared."""
+        return self.evaluation.cost(self.noise)
+
+    def normal_equations(self) -> NormalEquations:
+        """Accumulate the normal equations, which few need and nobody keeps."""
+        return self.evaluation.normal_equations(self.noise)
+
+    def support(self, frame: int) -> NDArray[np.float64]:
+        """Return the robust weight (V,) of one frame's observations around every vertex."""
+        surface = self.problem.surface_seen_by(frame)
+        seen = self.evaluation.frames[frame].faces
+        of_face = np.bincount(seen, self.weights[frame], len(surface.faces))
+        total = np.bincount(surface.faces.ravel(), np.repeat(of_face, 3), surface.size)
+        return total.astype(np.float64)
+
+
+def trace_row(
+    at: Evaluation, noise: NoiseScale, iteration: int, began: float, size: float, damping: float
+) -> TraceRow:
+    """Describe an iteration of an optimisation that began at ``began`` (``perf_counter``)."""
+    focals = set(at.state.focals)
+    return TraceRow(
+        iteration=iteration,
+        seconds=time.perf_counter() - began,
+        cost=at.cost(noise) / max(at.problem.observations, 1) / noise.sigma**2,
+        focal=focals.pop() if len(focals) == 1 else None,
+        damping=damping,
+        scale_px=noise.scale,
+        step=size,
+    )

@@ -1,1 +1,0 @@
-"""How it is minimised, and what an optimum looks like."""

@@ -1,1 +1,0 @@
-"""From starts of the frames to problems, and which frames belong together."""

@@ -1,0 +1,1 @@
+"""From a fit to the solution that is saved: units, estimates, warnings, verdict."""

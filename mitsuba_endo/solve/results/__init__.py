@@ -1,1 +1,0 @@
-"""From a fit to the solution that is saved."""

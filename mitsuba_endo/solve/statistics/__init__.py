@@ -1,1 +1,0 @@
-"""What the data tell about the unknowns, and what they cannot."""
