@@ -40,6 +40,10 @@ class Camera(Record):
     distortion: list[float] = []
     """Coefficients in the model's order: k1, k2, p1, p2, k3[, k4, k5, k6]; fisheye k1..k4; omni
     xi, k1, k2, p1, p2, k3; double_sphere xi, alpha; scaramuzza b1..b4, d, e."""
+    K_std: Annotated[list[PositiveFloat], Field(min_length=4, max_length=4)] | None = None
+    """Standard deviations of fx, fy, cx, cy, pixels: a prior where they are unknowns."""
+    distortion_std: PositiveFloat | list[PositiveFloat] | None = None
+    """Standard deviation of every coefficient, or one for all, likewise."""
 
     @field_validator("model")
     @classmethod
@@ -67,6 +71,16 @@ class Camera(Record):
             raise ValueError(
                 f"{len(self.distortion)} distortion coefficients do not fit model {self.model}; "
                 f"give one of {', '.join(map(str, allowed))}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _deviation_count(self) -> "Camera":
+        given, std = len(self.distortion), self.distortion_std
+        if isinstance(std, list) and len(std) != max(given, 1):
+            raise ValueError(
+                f"distortion_std has {len(std)} values and distortion {given}; give one for each "
+                "coefficient, or one number for all"
             )
         return self
 

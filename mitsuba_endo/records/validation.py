@@ -80,7 +80,7 @@ def validate(model: type[R], data: dict[str, Any], source: str) -> R:
         raise InputError(*_explain(model, first, path, field)) from None
 
 
-_SYMBOLS = {"K", "R"}  # the only capitalised keys of our files
+_SYMBOLS = {"K", "R", "K_std"}  # the only capitalised keys of our files
 
 
 def _is_union_tag(part: object) -> bool:

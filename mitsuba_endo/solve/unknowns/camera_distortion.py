@@ -1,0 +1,44 @@
+"""Lens distortion of the camera."""
+
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...geometry.cameras import CAMERAS
+from ...records.rig import Rig, Sharing
+from ...rendering.coordinates import FrameModel
+from ...rendering.keys import LENSES
+from .block import Floats, Value, VectorBlock, register_block
+
+_LEAST_TERMS = 2
+"""Coefficients that are unknowns where the rig names none: k1 and k2."""
+
+
+@register_block
+class CameraDistortion(VectorBlock):
+    """The coefficients of the camera's model, in the order of the rig file."""
+
+    name: ClassVar[str] = "camera_distortion"
+    words: ClassVar[str] = "camera distortion"
+    order: ClassVar[int] = 42
+    modes: ClassVar[tuple[Sharing, ...]] = ("fixed", "shared")
+    def given(self, rig: Rig) -> Floats:
+        coefficients, allowed = rig.camera.distortion, CAMERAS[rig.camera.model].max_coefficients
+        least = 0 if self.sharing(rig) == "fixed" else min(_LEAST_TERMS, max(allowed))
+        return np.array([*coefficients, *[0.0] * (least - len(coefficients))])
+
+    def names(self, rig: Rig) -> tuple[str, ...]:
+        return LENSES[rig.camera.model][: len(self.given(rig))]
+
+    def holds(self, model: FrameModel, value: Value) -> bool:
+        return bool(np.array_equal(value, np.array(model.camera.distortion, float)))
+
+    def attach(self, model: FrameModel, value: Any) -> FrameModel:
+        return replace(model, camera=replace(model.camera, distortion=tuple(value)))
+
+    def prior_std(self, rig: Rig, value: Value) -> Floats | None:
+        std = rig.camera.distortion_std
+        if std is None:
+            return None
+        return np.full(len(value), std) if isinstance(std, float) else np.array(std, float)
