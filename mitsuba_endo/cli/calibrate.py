@@ -48,6 +48,14 @@ Solver = Annotated[
         help="levenberg-marquardt (also gauss-newton), or adam, the published first-order method.",
     ),
 ]
+SurfaceKind = Annotated[
+    Literal["lattice", "mesh"],
+    typer.Option(
+        "--surface",
+        help="Common surface of several frames: ranges seen from the first camera, or a mesh fused "
+        "from all, for folds and for cameras that travel.",
+    ),
+]
 Start = Annotated[
     Literal["search", "plane"],
     typer.Option(help="Search for a start, or the published plane and front-parallel projector."),
@@ -82,6 +90,7 @@ def calibrate(
     rig: RigFile,
     out: Out,
     solver: Solver = "levenberg-marquardt",
+    surface: SurfaceKind = "lattice",
     start: Start = "search",
     share: Share = None,
     seed: Seed = 0,
@@ -111,7 +120,7 @@ def calibrate(
         paths = decode_images(maps, rig, pattern, aside, output)
         decoded = aside if any(aside.iterdir()) else None
         frames, rig_record = load_input(paths, rig, share)
-        options = Options(solver=solver, start=start, seed=seed)
+        options = Options(solver=solver, surface=surface, start=start, seed=seed)
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
             solution = solve_and_write(

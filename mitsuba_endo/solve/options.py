@@ -16,6 +16,9 @@ class Options:
     cameras: Literal["registration", "identity"] = "registration"
     """Start of the camera poses of several frames: registration of the surfaces that each frame
     alone shows, or all cameras at the same place."""
+    surface: Literal["lattice", "mesh"] = "lattice"
+    """Common surface of several frames: one range for each direction from the first camera, or a
+    triangle mesh fused from what each frame sees, for folds and for cameras that travel."""
     plane_distance: float = 10.0
     """Distance of the starting plane, in baselines (start = plane)."""
     max_iterations: int = 60

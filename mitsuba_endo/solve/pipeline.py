@@ -17,6 +17,7 @@ from .costs.problem import Problem, make_problem
 from .frames.alone import solve_alone
 from .frames.initialisation import common_start, usable_starts, without_faults, without_repeats
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
+from .frames.joint_mesh import joint_mesh_problem
 from .frames.restart import with_restarts
 from .frames.resume import resumed_maps, resumed_problem
 from .frames.single import separate_surfaces
@@ -224,6 +225,8 @@ def _joint_problem(
 ) -> tuple[Problem, State]:
     """Build the joint problem on the kind of surface that the options ask for."""
     layout = job.layout(len(alone))
+    if job.options.surface == "mesh":
+        return joint_mesh_problem(alone, registered, job.camera, job.rig, layout, job.law)
     return joint_problem(alone, registered, job.rig, layout, job.law)
 
 
