@@ -4,6 +4,7 @@ from typing import Any
 
 from mitsuba_endo.geometry.laws import LAWS, ProjectorModel, projector_model
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
+from mitsuba_endo.rendering.coordinates import project_direction
 from mitsuba_endo.rendering.keys import DISTORTION
 from mitsuba_endo.rendering.untyped import dr, mi
 
@@ -163,10 +164,9 @@ class DoeProjector:
         elsewhere the other values are finite and meaningless, so that derivatives stay finite.
         """
         x, y, z = swap_axes(self.to_world.inverse() @ point)
-        front = z > _MIN_COSINE * dr.sqrt(x * x + y * y + z * z)
-        x, y, z = dr.select(front, x, 0.0), dr.select(front, y, 0.0), dr.select(front, z, 1.0)
         model = self.model()
-        u, v = model.project_xyz(x, y, z)
+        u, v, front = project_direction(model, x, y, z, _MIN_COSINE)
+        x, y, z = dr.select(front, x, 0.0), dr.select(front, y, 0.0), dr.select(front, z, 1.0)
         unfolded = model.distortion.unfolded(*LAWS[self.law].normalise(x, y, z))
         return (
             mi.Float(u),

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 
 
 class RayCaster:
-    """Casts rays at one triangle mesh: Mitsuba finds the triangle, NumPy meets its plane.
+    """Casts rays at one triangle mesh: Mitsuba finds the triangle, whose plane is then met.
 
     So the range is exact to double precision although the search runs in single precision. A ray
     exactly along an edge between two triangles may slip through, as in every Mitsuba rendering.
@@ -34,15 +34,13 @@ class RayCaster:
         """Return the distance, as :meth:`range`, and the face (N,) that is met, 0 for a miss."""
         import mitsuba as mi
 
+        from ..rendering.coordinates import distances
+
         start = mi.Point3f(origin.astype(np.float32))
         index, hit = self._mesh.cast(start, mi.Vector3f(directions.T.astype(np.float32)))
         triangle = np.array(index).astype(np.int64)
-        a, b, c = np.moveaxis(self._corners[triangle], 1, 0)
-        normal = np.cross(b - a, c - a)
-        slope = np.sum(normal * directions, -1)
-        met = np.array(hit).astype(bool) & (slope != 0)
-        height = np.sum(normal * (a - origin), -1)
-        return np.where(met, height / np.where(met, slope, 1.0), np.nan), triangle
+        distance = distances(self._corners[triangle], origin, directions)
+        return np.where(np.array(hit).astype(bool), distance, np.nan), triangle
 
 
 def range_image(caster: RayCaster, camera: CameraModel) -> Floats:

@@ -7,8 +7,12 @@ Dr.Jit scalars of one entry a pixel; what is differentiated is up to whoever mad
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
+from .moving_mesh import vector
 from .untyped import dr, mi
 
 
@@ -70,6 +74,25 @@ def plane_distance(origin: Any, direction: Any, corners: Any) -> Any:
     return dr.dot(normal, a - origin) / dr.dot(normal, direction)
 
 
+def distances(
+    corners: NDArray[np.float64], origin: NDArray[np.float64], directions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return :func:`plane_distance` (N,) of NumPy rays to their triangles (N, 3, 3).
+
+    Args:
+        corners: of every triangle.
+        origin: (3,) or (N, 3).
+        directions: (N, 3).
+
+    Returns:
+        NaN where a ray is parallel to its triangle.
+    """
+    a, b, c = (vector(corners[:, i]) for i in range(3))
+    start, way = vector(np.broadcast_to(origin, directions.shape)), vector(directions)
+    distance = plane_distance(start, way, (a, b, c)).numpy()
+    return np.where(np.isfinite(distance), distance, np.nan)
+
+
 def project_along(model: FrameModel, direction: Any, distance: Any) -> tuple[Any, Any, Any]:
     """Return the coordinate (u, v) of the point ``distance`` along a camera ray, and a mask.
 
@@ -85,8 +108,27 @@ def project_along(model: FrameModel, direction: Any, distance: Any) -> tuple[Any
     pose = model.projector_from_camera
     # Projection models ignore the length of their argument; over the distance it stays near one.
     Y = pose.rotate(direction) + pose.t / distance
-    front = Y.z > 0
-    u, v = model.projector.project_xyz(Y.x, Y.y, dr.select(front, Y.z, 1.0))
+    return project_direction(model.projector, Y.x, Y.y, Y.z)
+
+
+def project_direction(
+    projector: Projects, x: Any, y: Any, z: Any, least_cosine: float = 0.0
+) -> tuple[Any, Any, Any]:
+    """Return the coordinate (u, v) of directions in the projector's frame, and a mask.
+
+    Args:
+        projector: its intrinsics.
+        x: first component of directions of any length.
+        y: second component.
+        z: along the optical axis.
+        least_cosine: cosine of the largest angle to the axis that counts as in front.
+
+    Returns:
+        Pattern pixels, finite and without meaning where the mask, in front of it, is false.
+    """
+    # Without a limit the length is not needed, and its derivative is not traced.
+    front = z > (least_cosine * dr.sqrt(x * x + y * y + z * z) if least_cosine else 0)
+    u, v = projector.project_xyz(x, y, dr.select(front, z, 1.0))
     return u, v, front
 
 

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
+from .coordinates import FrameModel, Pose, distances, project_along
 from .moving_mesh import MovingMesh, cast_into, vector
+from .untyped import mi
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ class MeshScene:
         camera_from_world = world_from_camera.inverse()
         world_from_projector = world_from_camera @ projector_from_camera.inverse()
         at = camera_from_world.apply(points)
-        q = projector.project(projector_from_camera.apply(at))
+        q = self._coordinates(camera, at, projector, projector_from_camera)
         lit = hit & np.isfinite(q).all(1) & self.reaches(world_from_projector.t, points)
         if size is not None:
             lit &= ((q >= -0.5) & (q <= np.array(size) - 0.5)).all(1)
@@ -93,6 +95,21 @@ class MeshScene:
             np.where(lit[:, None], q, np.nan).reshape(*shape, 2),
             np.where(hit[:, None], at, np.nan).reshape(*shape, 3),
         )
+
+    @staticmethod
+    def _coordinates(
+        camera: CameraModel,
+        points: NDArray[np.float64],
+        projector: ProjectorModel,
+        projector_from_camera: RigidTransform,
+    ) -> NDArray[np.float64]:
+        """Return (N, 2) coordinates of points (N, 3) in the camera's frame, NaN behind."""
+        distance = np.linalg.norm(points, axis=1)
+        here, pose = Pose.of(RigidTransform.identity()), Pose.of(projector_from_camera)
+        model = FrameModel(camera, here, pose, projector)
+        ways = vector(points / distance[:, None])
+        u, v, front = project_along(model, ways, mi.Float64(distance))
+        return np.where(front.numpy()[:, None], np.stack([u.numpy(), v.numpy()], -1), np.nan)
 
     def through_pixels(self, camera: CameraModel, world_from_camera: RigidTransform) -> Hits:
         """Follow the rays through all pixels' centres, row by row."""
@@ -105,14 +122,13 @@ class MeshScene:
             vector(np.broadcast_to(origin, directions.shape)), vector(directions)
         )
         index = triangle.numpy().astype(np.int64)
-        a, b, c = (self._vertices[self._faces[index, i]] for i in range(3))
-        normal = np.cross(b - a, c - a)
-        along = np.einsum("ni,ni->n", normal, directions)
-        distance = np.einsum("ni,ni->n", normal, a - origin) / np.where(along == 0, np.nan, along)
+        corners = self._vertices[self._faces[index]]
+        distance = distances(corners, origin, directions)
+        sides = corners[:, 1:] - corners[:, :1]
         return Hits(
             origin + distance[:, None] * directions,
             index,
-            normal,
+            np.cross(sides[:, 0], sides[:, 1]),
             hit.numpy() & np.isfinite(distance),
         )
 

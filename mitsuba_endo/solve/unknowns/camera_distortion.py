@@ -23,6 +23,7 @@ class CameraDistortion(VectorBlock):
     words: ClassVar[str] = "camera distortion"
     order: ClassVar[int] = 42
     modes: ClassVar[tuple[Sharing, ...]] = ("fixed", "shared")
+
     def given(self, rig: Rig) -> Floats:
         coefficients, allowed = rig.camera.distortion, CAMERAS[rig.camera.model].max_coefficients
         least = 0 if self.sharing(rig) == "fixed" else min(_LEAST_TERMS, max(allowed))
