@@ -140,14 +140,14 @@ def load_input(
     Raises:
         InputError: a file is missing or wrong, or the maps do not belong to the rig.
     """
-    from ..records.consistency import check_maps
     from ..records.rig import load_rig
+    from ..sanity.examine import examine
 
     rig = load_rig(rig_file)
     if share:
         rig = with_sharing(rig, share)
     maps = _load_maps(paths)
-    check_maps(maps, rig)
+    examine(maps, rig)  # refuses before any work; the solver asks again and keeps the warnings
     return maps, rig
 
 

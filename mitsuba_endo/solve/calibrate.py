@@ -8,11 +8,11 @@ from threadpoolctl import threadpool_limits
 from ..geometry.laws import LAWS
 from ..records.calibration import Calibration
 from ..records.checkpoint import Checkpoint
-from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
+from ..sanity.examine import examine
 from .frames.weights import balanced
 from .history import History
 from .inference.fit import Fit
@@ -49,12 +49,12 @@ def calibrate(
     """
     options = options or Options()
     say = progress or (lambda _share, _step: None)
-    check_maps(maps, rig)
     minimiser_of(options)  # an unknown one is told before any work
+    examined = examine(maps, rig)
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.
-    with threadpool_limits(1, "blas"):
-        weighted = balanced(maps)
+    with threadpool_limits(1, "blas"), examined.told_on_failure():
+        weighted = balanced(examined.maps)
         jobs = [
             Job(weighted, camera, rig, law, options, resume, history=History(observe))
             for law in _laws(rig, resume)
@@ -62,7 +62,7 @@ def calibrate(
         fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
-        return assemble(fit, camera, rig, options, evidence, warnings)
+        return assemble(fit, camera, rig, options, evidence, [*examined.warnings, *warnings])
 
 
 def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:

@@ -1,0 +1,37 @@
+"""Inputs of other people that failed, where their folder is present: the kind is named."""
+
+from pathlib import Path
+
+import pytest
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.rig import load_rig
+from mitsuba_endo.sanity.examine import Examined, examine
+
+FIELD = Path(__file__).parents[3] / "shared" / "field"
+pytestmark = pytest.mark.skipif(not FIELD.is_dir(), reason=f"{FIELD} is absent")
+
+
+def _examined(folder: str, map_name: str, rig: str) -> Examined:
+    return examine([load_map(FIELD / folder / map_name)], load_rig(FIELD / folder / rig))
+
+
+def test_mirrored():
+    """Oracle: the folder's README."""
+    with pytest.raises(InputError, match="it is mirrored"):
+        _examined("12_mirrored_map", "mirror.npz", "rig.yaml")
+
+
+@pytest.mark.parametrize(
+    ("folder", "map_name", "rig", "kinds"),
+    [
+        ("11_lens_shift_default_centre", "map.exr", "asked.yaml", ["centre_assumed"]),
+        ("11_lens_shift_default_centre", "map.exr", "rig.yaml", []),
+        ("15_zero_missing", "m03_zeromissing.npz", "m03_zeromissing.yaml", ["missing_value"]),
+        ("22_lens_beyond_its_range", "map.exr", "m40_folding.yaml", ["lens_fold"]),
+    ],
+)
+def test_named(folder: str, map_name: str, rig: str, kinds: list[str]):
+    """Oracle: the folders' READMEs; a rig with the true centre draws nothing."""
+    assert [f.kind for f in _examined(folder, map_name, rig).findings] == kinds
