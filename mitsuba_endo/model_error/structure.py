@@ -77,7 +77,7 @@ def usable_weights(
     residuals: NDArray[np.floating], weights: NDArray[np.floating] | None
 ) -> NDArray[np.float64]:
     """Return weights (H, W) that are zero where a residual (H, W, 2) or weight is missing."""
-    finite = np.isfinite(residuals).all(-1)
+    finite = np.asarray(np.isfinite(residuals).all(-1))
     if weights is None:
         return finite.astype(np.float64)
     return np.where(finite & (weights > 0), weights, 0.0).astype(np.float64)

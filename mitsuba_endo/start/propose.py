@@ -80,6 +80,22 @@ def ladder(projector: ProjectorModel, width: int, data: Correspondences) -> Vect
     return np.sort(np.concatenate([rungs[rungs > high], high * np.array(ABOVE_LIMIT)]))
 
 
+def focal_lengths(
+    projector: ProjectorModel,
+    width: int,
+    data: Correspondences,
+    refine_focal: bool,
+    guess: float | None,
+) -> tuple[Vectors, tuple[float, float]]:
+    """Return the focal lengths to propose and the bounds that the refinement must respect."""
+    if not refine_focal:
+        return np.array([projector.focal if guess is None else guess]), (0.0, np.inf)
+    focals = ladder(projector, width, data)
+    if guess is not None:
+        focals = np.append(focals, guess)
+    return focals, (focals.min() / 2, focals.max() * 2)
+
+
 def distinct(proposals: list[Proposal], count: int) -> list[Proposal]:
     """Return up to ``count`` of the best that differ in pose or by 20 % in focal length."""
     kept: list[Proposal] = []

@@ -13,12 +13,13 @@ from .choose import Minimum, Problem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
 from .correspondences import Correspondences, checked_map, gather, spread_sample
 from .depth_image import depth_image
+from .lens_shift import PROPOSE_POINTS, REFINE_POINTS, Frame, find_lens_shift
 from .notes import remarks
-from .propose import distinct, ladder, propose
+from .propose import distinct, focal_lengths, propose
 from .refine import evaluate
 from .result import Start
 
-PROPOSE_POINTS, REFINE_POINTS, FINISH_POINTS = 500, 1500, 40_000
+FINISH_POINTS = 40_000
 CANDIDATES = 8
 MAX_SCALE = 0.02
 """Residuals above this share of the pattern's width mean that no calibration was found."""
@@ -33,6 +34,7 @@ def search_start(
     *,
     refine_focal: bool = True,
     focal_guess: float | None = None,
+    search_centre: bool = False,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Start:
@@ -50,6 +52,8 @@ def search_start(
         size: pattern width and height, pixels.
         refine_focal: search the focal length; False keeps it fixed.
         focal_guess: with ``refine_focal`` one more focal length to propose, else its fixed value.
+        search_centre: look for the projector's centre along the pattern's height, for a lens whose
+            centre is not given; see :mod:`.lens_shift`.
         seed: of the samples drawn.
         progress: called with the name of each step.
 
@@ -71,11 +75,20 @@ def search_start(
     some = spread_sample(data, REFINE_POINTS, camera.width, rng)
     many = spread_sample(data, FINISH_POINTS, camera.width, rng)
 
+    noise, notes = noise_scale(q, usable), []
+    if search_centre:
+        say("search for the projector's centre")
+        shift = find_lens_shift(
+            [Frame(few, some, noise)], projector, size, refine_focal=refine_focal,
+            focal_guess=focal_guess,
+        )  # fmt: skip
+        projector, notes = projector.with_(centre=shift.centre), [shift.note]
+
     say("propose poses")
-    focals, bounds = _focals(projector, size[0], few, refine_focal, focal_guess)
+    focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
     say("refine candidates")
-    problem = Problem(projector, refine_focal, bounds, noise_scale(q, usable))
+    problem = Problem(projector, refine_focal, bounds, noise)
     minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
     say("finish")
     minima = finish(problem, minima, some, many) if minima else []
@@ -90,7 +103,7 @@ def search_start(
         depth=seen.depth,
         used=seen.used,
         scale_px=robust_scale(found),
-        notes=remarks(minima, many, refine_focal),
+        notes=[*notes, *remarks(minima, many, refine_focal)],
         alternatives=[m.candidate for m in minima[1:]],
     )
 
@@ -127,19 +140,3 @@ def _check_focal(projector: ProjectorModel, refine_focal: bool, guess: float | N
             f"focal length {given} is not a positive number",
             todo="give it in pattern pixels, or let the search find it",
         )
-
-
-def _focals(
-    projector: ProjectorModel,
-    width: int,
-    data: Correspondences,
-    refine_focal: bool,
-    guess: float | None,
-) -> tuple[NDArray[np.float64], tuple[float, float]]:
-    """Return the focal lengths to propose and the bounds that the refinement must respect."""
-    if not refine_focal:
-        return np.array([projector.focal if guess is None else guess]), (0.0, np.inf)
-    focals = ladder(projector, width, data)
-    if guess is not None:
-        focals = np.append(focals, guess)
-    return focals, (focals.min() / 2, focals.max() * 2)

@@ -56,6 +56,9 @@ MAPS = {
     "three channels": (lambda m: np.concatenate([m, m[..., :1]], -1), "HxWx2"),
     "transposed": (lambda m: np.swapaxes(m, 0, 1), f"{HEIGHT} x {WIDTH}"),
     "text": (lambda m: m.astype(str), "HxWx2"),
+    "mirrored": (lambda m: m * [-1, 1] + [239, 0], "it is mirrored"),
+    "upside down": (lambda m: m * [1, -1] + [0, 119], "projector.y runs upwards"),
+    "x and y swapped": (lambda m: m[..., ::-1] * [1, 0.5], "swapped"),
 }
 
 

@@ -1,10 +1,12 @@
 """Calibration end to end, from a map and a rig file to the solution."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.distortion import BrownDistortion
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
@@ -172,6 +174,24 @@ class TestSolution:
         without = run(self.RIG, Options(jackknife=False)).solution.projector.focal
         assert without.std_jackknife is None
         assert without.std == without.std_formal
+
+    def test_doubts_about_the_input_are_told(self):
+        """Oracle: rows of zeros are named and left out: the same solution as with NaN there."""
+        zero, missing = self.RIG.q.copy(), self.RIG.q.copy()
+        zero[:8], missing[:8] = 0.0, np.nan
+        told = run(replace(self.RIG, q=zero)).solution
+        plain = run(replace(self.RIG, q=missing)).solution
+        assert ["hold (0, 0)" in w for w in told.warnings] == [True]
+        assert told.projector == plain.projector
+
+    def test_doubts_explain_why_there_is_no_solution(self):
+        """Oracle: random coordinates and a camera of twice the image's size; both are said."""
+        q = np.random.default_rng(0).uniform(0, 300, self.RIG.q.shape)
+        rig = rig_file(self.RIG)
+        K = [[2 * v for v in row] for row in rig.camera.K[:2]] + [[0, 0, 1]]
+        camera = rig.camera.model_copy(update={"K": K})
+        with pytest.raises(InputError, match=r"likely cause: camera\.K: by its centre"):
+            calibrate([map_of(replace(self.RIG, q=q))], rig.model_copy(update={"camera": camera}))
 
     def test_says_when_it_did_not_converge(self):
         """Oracle: a warning and the outcome."""

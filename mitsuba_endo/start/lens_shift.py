@@ -1,0 +1,201 @@
+"""Search over the centre of a projector whose lens is shifted, where nobody gave it.
+
+Lens projectors have their principal point in the middle of the pattern's width and anywhere along
+its height, often at the lower edge or below it, so that they can stand on a table. With the camera
+known, one pair determines seven numbers: rotation, direction of translation, and two of focal
+length and centre. So the height of the centre can be found beside the focal length, while its
+place across cannot.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from mitsuba_endo.geometry.cameras import CameraModel
+from mitsuba_endo.geometry.laws import ProjectorModel
+
+from .choose import MIN_SCALE_PX, REDESCENDING, Problem, refine, robust_scale
+from .clean import clean_map, noise_scale
+from .correspondences import Correspondences, checked_map, gather, spread_sample
+from .propose import distinct, focal_lengths, propose
+from .refine import Loss, State, evaluate, minimise
+
+PROPOSE_POINTS, REFINE_POINTS = 500, 1500
+HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
+"""Centres tried first, of the pattern's height: lens shifts of up to 75 %, upwards or downwards."""
+MIDDLE = 0.5
+FINALISTS = 2
+CANDIDATES = 4
+"""Poses refined at each centre."""
+BETTER = 0.7
+"""Scale of the residuals over that of the middle from which another centre is believed. Small
+errors elsewhere, such as a centre off the middle across, gain less."""
+_REACH = (0.3, 0.1)
+"""Of the pattern's height: how far each round of the descent looks to either side."""
+_EVALUATIONS = 18
+_PATIENT = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Samples of one frame's correspondences."""
+
+    few: Correspondences
+    """To propose poses from."""
+    some: Correspondences
+    """To refine them on."""
+    noise_px: float
+    """See :class:`.choose.Problem`."""
+
+
+@dataclass(frozen=True, eq=False)
+class LensShift:
+    """Where the projector's centre was looked for and found."""
+
+    centre: tuple[float, float]
+    """Pattern pixels; the middle of the pattern unless another is clearly better."""
+    found: bool
+    """Whether another is."""
+    scale_px: float
+    """Robust scale of the residuals at the best centre, pattern pixels; the worst frame's."""
+    middle_scale_px: float
+    """The same at the middle; infinite where no pose is possible there."""
+
+    @property
+    def note(self) -> str:
+        """What the user should know."""
+        x, y = self.centre
+        if not self.found:
+            return (
+                "The projector's centre was not given and no height of it is clearly better than "
+                "the pattern's middle, which is assumed."
+            )
+        middle = (
+            f"residuals fall from {self.middle_scale_px:.2g} to {self.scale_px:.2g} px"
+            if np.isfinite(self.middle_scale_px)
+            else "no pose is possible with the middle"
+        )
+        return (
+            f"The projector's centre was not given: ({x:.4g}, {y:.4g}) px was found along the "
+            f"pattern's height, at half of its width ({middle}). Give it if it is known."
+        )
+
+
+def frame_samples(q: NDArray[np.floating], camera: CameraModel, rng: np.random.Generator) -> Frame:
+    """Sample a map (H, W, 2), pattern pixels with NaN = missing.
+
+    Raises:
+        InputError: fewer than 50 usable correspondences, or a map of another size.
+    """
+    q = checked_map(q, camera)
+    usable = clean_map(q)
+    data = gather(q, usable, camera)
+    few, some = (spread_sample(data, n, camera.width, rng) for n in (PROPOSE_POINTS, REFINE_POINTS))
+    return Frame(few, some, noise_scale(q, usable))
+
+
+def find_lens_shift(
+    frames: Sequence[Frame],
+    projector: ProjectorModel,
+    size: tuple[int, int],
+    *,
+    refine_focal: bool = True,
+    focal_guess: float | None = None,
+) -> LensShift:
+    """Find the height of the projector's centre that explains the frames best.
+
+    Poses and focal length are searched anew at each of :data:`HEIGHTS`; from the best of these the
+    height descends with everything else following. Frames share the centre alone.
+
+    Args:
+        frames: samples of each frame.
+        projector: law, aspect and distortion, which must be right: an omitted distortion passes for
+            a shift. Its centre is not used.
+        size: pattern width and height, pixels.
+        refine_focal: see :func:`.search.search_start`.
+        focal_guess: see there.
+    """
+    width, height = size
+    middle = ((width - 1) / 2, (height - 1) / 2)
+    tried: dict[float, list[State]] = {}
+    for share in HEIGHTS:
+        moved = projector.with_(centre=(middle[0], share * (height - 1)))
+        states = [_best(f, moved, width, refine_focal, focal_guess) for f in frames]
+        known = [s for s in states if s is not None]
+        if len(known) == len(frames):
+            tried[share] = known
+    if not tried:
+        return LensShift(middle, False, np.inf, np.inf)
+    ends = [
+        _descended(list(frames), tried[share], share, height, refine_focal)
+        for share in sorted(tried, key=lambda v: _scale(tried[v]))[:FINALISTS]
+    ]
+    best = min(ends, key=_scale)
+    scale, there = _scale(best), _scale(tried[MIDDLE]) if MIDDLE in tried else np.inf
+    found = scale < BETTER * there
+    y = float(best[0].projector.centre[1]) if found else middle[1]
+    return LensShift((middle[0], y), found, scale, there)
+
+
+def _best(
+    frame: Frame, projector: ProjectorModel, width: int, refine_focal: bool, guess: float | None
+) -> State | None:
+    """Return the best calibration of a frame at one centre, None where there is none."""
+    focals, bounds = focal_lengths(projector, width, frame.few, refine_focal, guess)
+    proposals = distinct(propose(frame.few, projector, focals), CANDIDATES)
+    problem = Problem(projector, refine_focal, bounds, frame.noise_px)
+    minima = refine(problem, ((p.pose, p.focal) for p in proposals), frame.some)
+    return minima[0].state if minima else None
+
+
+def _descended(
+    frames: list[Frame], states: list[State], share: float, height: int, refine_focal: bool
+) -> list[State]:
+    """Return the states at the best height near ``share``, poses and focal lengths following."""
+    y = share * (height - 1)
+    for reach in _REACH:
+        descent = _Descent(frames, states, refine_focal)
+        span = reach * height
+        minimize_scalar(
+            descent, bounds=(y - span, y + span), method="bounded",
+            options={"xatol": 0.1, "maxiter": _EVALUATIONS},
+        )  # fmt: skip
+        states, y = descent.states, float(descent.states[0].projector.centre[1])
+    return states
+
+
+class _Descent:
+    """Cost of a height, from the best states met so far."""
+
+    def __init__(self, frames: list[Frame], states: list[State], refine_focal: bool) -> None:
+        self.frames, self.states, self.refine_focal = frames, states, refine_focal
+        self.losses = [Loss(True, REDESCENDING * max(robust_scale(s), MIN_SCALE_PX))
+                       for s in states]  # fmt: skip
+        self.cost = self._cost(states)
+
+    def __call__(self, y: float) -> float:
+        moved = [self._minimised(k, y) for k in range(len(self.frames))]
+        cost = self._cost(moved)
+        if cost < self.cost:
+            self.cost, self.states = cost, moved
+        return cost
+
+    def _minimised(self, k: int, y: float) -> State:
+        state, data = self.states[k], self.frames[k].some
+        projector = state.projector.with_(centre=(state.projector.centre[0], y))
+        return minimise(
+            evaluate(state.pose, projector, data), data, self.losses[k],
+            refine_focal=self.refine_focal, iterations=_PATIENT,
+        )  # fmt: skip
+
+    def _cost(self, states: list[State]) -> float:
+        """Return the mean cost over the frames, each in squares of its own scale."""
+        pairs = zip(self.losses, states, strict=True)
+        return float(np.mean([loss.cost(s.r) / loss.scale**2 for loss, s in pairs]))
+
+
+def _scale(states: Sequence[State]) -> float:
+    return max(robust_scale(s) for s in states)
