@@ -30,9 +30,9 @@ MIDDLE = 0.5
 FINALISTS = 2
 CANDIDATES = 4
 """Poses refined at each centre."""
-BETTER = 0.7
-"""Scale of the residuals over that of the middle from which another centre is believed. Small
-errors elsewhere, such as a centre off the middle across, gain less."""
+BETTER = 0.95
+"""Scale of the residuals over that of the middle up to which another centre is believed: a right
+middle loses less than 1 % to chance, the samples' paired spread."""
 _REACH = (0.3, 0.1)
 """Of the pattern's height: how far each round of the descent looks to either side."""
 _EVALUATIONS = 18
@@ -63,6 +63,8 @@ class LensShift:
     """Robust scale of the residuals at the best centre, pattern pixels; the worst frame's."""
     middle_scale_px: float
     """The same at the middle; infinite where no pose is possible there."""
+    states: list[State]
+    """The calibration of every frame at ``centre``; empty where none is possible."""
 
     @property
     def note(self) -> str:
@@ -128,16 +130,19 @@ def find_lens_shift(
         if len(known) == len(frames):
             tried[share] = known
     if not tried:
-        return LensShift(middle, False, np.inf, np.inf)
+        return LensShift(middle, False, np.inf, np.inf, [])
+    ranked = sorted(tried, key=lambda v: _scale(tried[v]))
     ends = [
         _descended(list(frames), tried[share], share, height, refine_focal)
-        for share in sorted(tried, key=lambda v: _scale(tried[v]))[:FINALISTS]
+        for share in ranked[:FINALISTS]
     ]
-    best = min(ends, key=_scale)
+    settled = [_settled(frames, states, refine_focal) for states in ends]
+    best = min([*(s for s in settled if s), tried[ranked[0]]], key=_scale)
     scale, there = _scale(best), _scale(tried[MIDDLE]) if MIDDLE in tried else np.inf
     found = scale < BETTER * there
     y = float(best[0].projector.centre[1]) if found else middle[1]
-    return LensShift((middle[0], y), found, scale, there)
+    states = best if found else tried.get(MIDDLE, [])
+    return LensShift((middle[0], y), found, scale, there, states)
 
 
 def _best(
@@ -165,6 +170,19 @@ def _descended(
         )  # fmt: skip
         states, y = descent.states, float(descent.states[0].projector.centre[1])
     return states
+
+
+def _settled(frames: Sequence[Frame], states: list[State], refine_focal: bool) -> list[State]:
+    """Return the minima next to the states; empty where points would lie behind the devices."""
+    settled: list[State] = []
+    for frame, state in zip(frames, states, strict=True):
+        focal = float(state.projector.focal)
+        problem = Problem(state.projector, refine_focal, (focal / 2, 2 * focal), frame.noise_px)
+        minima = refine(problem, [(state.pose, focal)], frame.some)
+        if not minima:
+            return []
+        settled.append(minima[0].state)
+    return settled
 
 
 class _Descent:

