@@ -4,7 +4,6 @@ from typing import Any
 
 from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
-from mitsuba_endo.rendering.keys import LENSES
 from mitsuba_endo.rendering.untyped import dr, mi
 
 from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
@@ -97,8 +96,8 @@ class Endoscope:
     def __init__(self, props: Any) -> None:
         mi.Sensor.__init__(self, props)
         self.model = str(props.get("model", "opencv"))
-        if self.model not in LENSES:
-            expected = ", ".join(LENSES)
+        if self.model not in CAMERAS:
+            expected = ", ".join(CAMERAS)
             raise RuntimeError(f'unknown "model" {self.model!r}, expected one of {expected}')
         width, height = (int(n) for n in self.film().size())
         if width < 1 or height < 1:
@@ -107,7 +106,7 @@ class Endoscope:
         self.fy = read_number(props, "fy", props["fx"], positive=True)
         self.cx = read_number(props, "cx", (width - 1) / 2)
         self.cy = read_number(props, "cy", (height - 1) / 2)
-        for name in LENSES[self.model]:
+        for name in CAMERAS[self.model].coefficients:
             setattr(self, name, read_number(props, name, 0.0))
         self.near_clip = float(props.get("near_clip", 1e-2))
         self.far_clip = float(props.get("far_clip", 1e4))
@@ -124,7 +123,7 @@ class Endoscope:
     def traverse(self, callback: Any) -> None:
         mi.Sensor.traverse(self, callback)
         moving = mi.ParamFlags.Differentiable | mi.ParamFlags.Discontinuous
-        for name in (*_INTRINSICS, *LENSES[self.model], "to_world"):
+        for name in (*_INTRINSICS, *CAMERAS[self.model].coefficients, "to_world"):
             callback.put(name, getattr(self, name), moving)
 
     def parameters_changed(self, keys: Any = ()) -> None:
@@ -133,7 +132,7 @@ class Endoscope:
 
     def distortion(self) -> list[Any]:
         """Return the lens coefficients in the order of the model."""
-        return [getattr(self, name) for name in LENSES[self.model]]
+        return [getattr(self, name) for name in CAMERAS[self.model].coefficients]
 
     def _local_direction(self, u: Any, v: Any) -> Any:
         """Return the unit direction of pixels in Mitsuba's sensor frame; NaN where none exists."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.cameras import CameraModel
+from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..rendering import keys
@@ -186,7 +186,8 @@ def _sensor(parts: SceneParts) -> dict[str, Any]:
     camera, K = parts.camera, parts.camera.K
     film = {"type": "hdrfilm", "width": camera.width, "height": camera.height,
             "rfilter": {"type": "box"}, "pixel_format": "rgb"}  # fmt: skip
-    lens = dict(zip(keys.LENSES[camera.model], (float(k) for k in camera.distortion), strict=False))
+    names = CAMERAS[camera.model].coefficients
+    lens = dict(zip(names, (float(k) for k in camera.distortion), strict=False))
     return {
         "type": "endoscope", "model": camera.model,
         "fx": float(K[0, 0]), "fy": float(K[1, 1]), "cx": float(K[0, 2]), "cy": float(K[1, 2]),

@@ -3,6 +3,8 @@
 Scenes give their optimised objects the ids below; a parameter's key is the id and its name.
 """
 
+from ..geometry.cameras import CAMERAS
+
 CAMERA = "camera"
 """Id of the ``endoscope`` sensor."""
 PROJECTOR = "projector"
@@ -14,16 +16,6 @@ LAMP = "lamp"
 
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 """Names of the projector's distortion, in OpenCV's order."""
-LENSES = {
-    "opencv": (*DISTORTION, "k4", "k5", "k6"),
-    "opencv_fisheye": ("k1", "k2", "k3", "k4"),
-    "omni": ("xi", *DISTORTION),
-    "double_sphere": ("xi", "alpha"),
-    "scaramuzza": ("b1", "b2", "b3", "b4", "d", "e"),
-}
-"""Names of the camera's coefficients for each model, in the order of its class."""
-
-
 VERTEX_POSITIONS = "vertex_positions"
 """Name of a mesh's flat (3 V) vertex positions where the mesh itself is traversed."""
 FACES = "faces"
@@ -75,7 +67,7 @@ def intrinsics(camera: str = CAMERA) -> tuple[str, str, str, str]:
 
 def lens(model: str, camera: str = CAMERA) -> tuple[str, ...]:
     """Return the keys of the camera's coefficients, in the order of its model."""
-    return tuple(f"{camera}.{name}" for name in LENSES[model])
+    return tuple(f"{camera}.{name}" for name in CAMERAS[model].coefficients)
 
 
 def film_size(camera: str = CAMERA) -> str:

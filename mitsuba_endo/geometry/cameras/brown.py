@@ -16,6 +16,7 @@ class OpenCVCamera:
 
     name: ClassVar[str] = "opencv"
     max_coefficients: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 5, 8)
+    coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

@@ -20,6 +20,7 @@ class DoubleSphere:
 
     name: ClassVar[str] = "double_sphere"
     max_coefficients: ClassVar[tuple[int, ...]] = (2,)
+    coefficients: ClassVar[tuple[str, ...]] = ("xi", "alpha")
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

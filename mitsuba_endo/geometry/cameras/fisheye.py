@@ -14,6 +14,7 @@ class OpenCVFisheye:
 
     name: ClassVar[str] = "opencv_fisheye"
     max_coefficients: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)
+    coefficients: ClassVar[tuple[str, ...]] = ("k1", "k2", "k3", "k4")
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

@@ -21,6 +21,7 @@ class Omni:
 
     name: ClassVar[str] = "omni"
     max_coefficients: ClassVar[tuple[int, ...]] = (1, 2, 3, 4, 5, 6)
+    coefficients: ClassVar[tuple[str, ...]] = ("xi", "k1", "k2", "p1", "p2", "k3")
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

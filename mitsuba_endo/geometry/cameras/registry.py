@@ -12,6 +12,8 @@ class CameraLaw(Protocol):
     name: ClassVar[str]
     max_coefficients: ClassVar[tuple[int, ...]]
     """Numbers of coefficients that a file may give."""
+    coefficients: ClassVar[tuple[str, ...]]
+    """Their names, in the order of files; scenes give them by name."""
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

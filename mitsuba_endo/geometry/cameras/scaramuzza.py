@@ -27,6 +27,7 @@ class Scaramuzza:
 
     name: ClassVar[str] = "scaramuzza"
     max_coefficients: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4, 6)
+    coefficients: ClassVar[tuple[str, ...]] = ("b1", "b2", "b3", "b4", "d", "e")
 
     def normalise(
         self, coefficients: Sequence[Array], x: Array, y: Array, z: Array

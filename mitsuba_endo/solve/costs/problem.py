@@ -80,8 +80,8 @@ class Problem:
             return observed.rays
         return camera.rays(observed.pixels.astype(np.float64))
 
-    def projector(self, state: State, frame: int) -> ProjectorModel:
-        """Return the projector of a frame at a state."""
+    def projector(self, state: State, frame: int) -> ProjectorModel | None:
+        """Return the projector of a frame at a state, see :meth:`State.projector`."""
         return state.projector(frame, self.observed[frame].camera, self.law)
 
     def place(self, state: State) -> None:

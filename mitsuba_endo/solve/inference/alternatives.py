@@ -105,9 +105,12 @@ def _groups(layout: Layout) -> list[list[int]]:
 
 def _rivals(result: OptimisationResult, noise_px: float, frames: list[int]) -> list[Rival]:
     problem, state, first = result.problem, result.state, frames[0]
+    projector = problem.projector(state, first)
+    if projector is None:  # the epipolar search knows plain models only
+        return []
     return rivals(
         _correspondences(result, frames),
-        problem.projector(state, first),
+        projector,
         state.at("projector_pose", first),
         refine_focal=problem.layout.free["focal"],
         noise_px=noise_px,

@@ -8,7 +8,6 @@ import numpy as np
 from ...geometry.cameras import CAMERAS
 from ...records.rig import Rig, Sharing
 from ...rendering.coordinates import FrameModel
-from ...rendering.keys import LENSES
 from .block import Floats, Value, VectorBlock, register_block
 
 _LEAST_TERMS = 2
@@ -30,7 +29,7 @@ class CameraDistortion(VectorBlock):
         return np.array([*coefficients, *[0.0] * (least - len(coefficients))])
 
     def names(self, rig: Rig) -> tuple[str, ...]:
-        return LENSES[rig.camera.model][: len(self.given(rig))]
+        return CAMERAS[rig.camera.model].coefficients[: len(self.given(rig))]
 
     def holds(self, model: FrameModel, value: Value) -> bool:
         return bool(np.array_equal(value, np.array(model.camera.distortion, float)))

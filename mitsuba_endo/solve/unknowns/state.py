@@ -78,11 +78,10 @@ class State:
                 model = block.attach(model, plain)
         return model
 
-    def projector(self, frame: int, camera: CameraModel, law: str) -> ProjectorModel:
-        """Return the projector of a frame."""
+    def projector(self, frame: int, camera: CameraModel, law: str) -> ProjectorModel | None:
+        """Return the projector of a frame, None where some unknown makes it more than a model."""
         model = self.frame_model(frame, camera, law).projector
-        assert isinstance(model, ProjectorModel)
-        return model
+        return model if isinstance(model, ProjectorModel) else None
 
 
 def blank_model(camera: CameraModel, law: str) -> FrameModel:
