@@ -1,5 +1,6 @@
 """``mitsuba-endo calibrate``: from correspondence maps to a solution folder."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -119,7 +120,7 @@ def calibrate(
         checkpoint = None if resume is None else load_checkpoint(resume)
         paths = decode_images(maps, rig, pattern, aside, output)
         decoded = aside if any(aside.iterdir()) else None
-        frames, rig_record = load_input(paths, rig, share)
+        frames, rig_record = load_input(paths, rig, share, output.print)
         options = Options(solver=solver, surface=surface, start=start, seed=seed)
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
@@ -133,17 +134,24 @@ def calibrate(
 
 
 def load_input(
-    paths: list[Path], rig_file: Path, share: str | None = None
+    paths: list[Path],
+    rig_file: Path,
+    share: str | None = None,
+    log: Callable[[str], None] = lambda note: None,
 ) -> tuple[list["CorrespondenceMap"], "Rig"]:
     """Read and check everything that a calibration starts from.
+
+    ``log`` is called with a sentence for each camera file of another program: what was read.
 
     Raises:
         InputError: a file is missing or wrong, or the maps do not belong to the rig.
     """
-    from ..records.rig import load_rig
+    from ..records.rig import read_rig
     from ..sanity.examine import examine
 
-    rig = load_rig(rig_file)
+    rig, notes = read_rig(rig_file)
+    for note in notes:
+        log(note)
     if share:
         rig = with_sharing(rig, share)
     maps = _load_maps(paths)

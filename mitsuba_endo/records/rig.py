@@ -4,7 +4,6 @@ import contextlib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import cv2
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
@@ -12,6 +11,7 @@ from ..errors import InputError
 from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.laws import LAWS, ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
+from .camera_files import read_camera_file
 from .validation import Record, read_yaml, validate
 
 Matrix3 = Annotated[
@@ -302,54 +302,73 @@ class Rig(Record):
 
 
 def load_rig(path: str | Path) -> Rig:
-    """Read and validate ``rig.yaml``; ``camera`` may name an OpenCV FileStorage file instead.
+    """Read and validate ``rig.yaml``; ``camera`` and ``projector`` may name other programs' files.
+
+    Raises:
+        InputError: names the file and field.
+    """
+    return read_rig(path)[0]
+
+
+def read_rig(path: str | Path) -> tuple[Rig, list[str]]:
+    """Read a rig file as :func:`load_rig` does, and say what was read from other files.
+
+    Returns:
+        The rig, and one sentence a file: its format, camera model and coefficients.
 
     Raises:
         InputError: names the file and field.
     """
     path = Path(path)
     data = read_yaml(path)
-    camera = data.get("camera")
-    if isinstance(camera, str):
-        data["camera"] = _opencv_camera(path.parent / camera)
-    return validate(Rig, data, str(path))
+    notes: list[str] = []
+    camera, projector = (_named_file(data.get(key)) for key in ("camera", "projector"))
+    if camera is not None:
+        data["camera"] = _camera_of(path, camera, notes)
+    if projector is not None:
+        data["projector"] = _projector_of(path, projector, notes)
+    return validate(Rig, data, str(path)), notes
 
 
-def _opencv_camera(path: Path) -> Camera:
-    """Read the camera part from a file written by OpenCV's calibration tools."""
-    if not path.is_file():
-        raise InputError("no such file", str(path), "check `camera` in the rig file")
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-    except (cv2.error, SystemError):
-        raise InputError("is not an OpenCV FileStorage", str(path), "check the file") from None
-    try:
-        K = _first_node(storage, ("camera_matrix", "cameraMatrix", "K", "M1"))
-        if K is None:
-            raise InputError("camera_matrix is missing", str(path), "export it with OpenCV")
-        d = _first_node(
-            storage, ("distortion_coefficients", "distCoeffs", "dist_coeffs", "D", "D1")
-        )
-        width, height = (storage.getNode(f"image_{n}") for n in ("width", "height"))
-        if width.empty() or height.empty():
-            raise InputError("image_width or image_height is missing", str(path), "add them")
-        fisheye = storage.getNode("fisheye_model")
-        is_fisheye = not fisheye.empty() and bool(fisheye.real())
-        data = {
-            "model": "opencv_fisheye" if is_fisheye else "opencv",
-            "width": int(width.real()), "height": int(height.real()), "K": K.tolist(),
-            "distortion": [] if d is None else d.ravel().tolist(),
-        }  # fmt: skip
-    except cv2.error:
-        raise InputError("is not an OpenCV calibration", str(path), "check the file") from None
-    finally:
-        storage.release()
-    return validate(Camera, data, str(path))
+def _named_file(value: Any) -> dict[str, Any] | None:
+    """Return the keys beside ``file``, and it, if a part of the rig names a file."""
+    if isinstance(value, str):
+        return {"file": value}
+    return value if isinstance(value, dict) and isinstance(value.get("file"), str) else None
 
 
-def _first_node(storage: cv2.FileStorage, names: tuple[str, ...]) -> np.ndarray | None:
-    for name in names:
-        node = storage.getNode(name)
-        if not node.empty():
-            return node.mat()
-    return None
+def _camera_of(path: Path, given: dict[str, Any], notes: list[str]) -> Camera:
+    """Read the camera; the rig may add the image's size, which not every format holds."""
+    source = path.parent / given["file"]
+    file, note = read_camera_file(source)
+    notes.append(note)
+    for key, value in given.items():
+        if key not in ("file", "width", "height"):
+            raise InputError("unknown key beside file", f"{path}: camera.{key}", "remove it")
+        if key != "file" and file.camera.get(key, value) != value:
+            raise InputError(
+                f"is {value}, and {file.camera[key]} in {source.name}", f"{path}: camera.{key}",
+                "give the camera of these images",
+            )  # fmt: skip
+    values = file.camera | {key: given[key] for key in ("width", "height") if key in given}
+    if "width" not in values or "height" not in values:
+        raise InputError(
+            "image_width or image_height is missing", str(source),
+            f"add them, or write camera: {{file: {given['file']}, width: W, height: H}}",
+        )  # fmt: skip
+    return validate(Camera, values, str(source))
+
+
+def _projector_of(path: Path, given: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+    """Read the projector; what the rig says beside it counts more."""
+    source = path.parent / given["file"]
+    file, _ = read_camera_file(source)
+    if not file.projector:
+        raise InputError("holds no projector", str(source), "write its keys into the rig file")
+    values = file.projector | {key: value for key, value in given.items() if key != "file"}
+    focal = file.projector["focal"]["value"]
+    start = (
+        "focal length and pose are starts" if "pose" in values else "the focal length is a start"
+    )
+    notes.append(f"{source.name} gives the projector, focal length {focal:g}; its {start}.")
+    return values
