@@ -23,6 +23,7 @@ class Kind(StrEnum):
     DEMO = "a demo"
     MAPS = "decoded maps"
     PATTERNS = "pattern images"
+    ROS = "camera files of ROS"
     SAMPLE = "a sample of a dataset"
     SCENE = "a Mitsuba scene"
     VIEWS = "views for training"

@@ -7,11 +7,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
-from ..errors import InputError
 from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.laws import LAWS, ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
-from .camera_files import read_camera_file
+from .camera_files.in_rig import camera_values, named_file, projector_values
 from .validation import Record, read_yaml, validate
 
 Matrix3 = Annotated[
@@ -322,53 +321,10 @@ def read_rig(path: str | Path) -> tuple[Rig, list[str]]:
     path = Path(path)
     data = read_yaml(path)
     notes: list[str] = []
-    camera, projector = (_named_file(data.get(key)) for key in ("camera", "projector"))
+    camera, projector = (named_file(data.get(key)) for key in ("camera", "projector"))
     if camera is not None:
-        data["camera"] = _camera_of(path, camera, notes)
+        values, source = camera_values(path, camera, notes, projector is not None)
+        data["camera"] = validate(Camera, values, source)
     if projector is not None:
-        data["projector"] = _projector_of(path, projector, notes)
+        data["projector"] = projector_values(path, projector, notes)
     return validate(Rig, data, str(path)), notes
-
-
-def _named_file(value: Any) -> dict[str, Any] | None:
-    """Return the keys beside ``file``, and it, if a part of the rig names a file."""
-    if isinstance(value, str):
-        return {"file": value}
-    return value if isinstance(value, dict) and isinstance(value.get("file"), str) else None
-
-
-def _camera_of(path: Path, given: dict[str, Any], notes: list[str]) -> Camera:
-    """Read the camera; the rig may add the image's size, which not every format holds."""
-    source = path.parent / given["file"]
-    file, note = read_camera_file(source)
-    notes.append(note)
-    for key, value in given.items():
-        if key not in ("file", "width", "height"):
-            raise InputError("unknown key beside file", f"{path}: camera.{key}", "remove it")
-        if key != "file" and file.camera.get(key, value) != value:
-            raise InputError(
-                f"is {value}, and {file.camera[key]} in {source.name}", f"{path}: camera.{key}",
-                "give the camera of these images",
-            )  # fmt: skip
-    values = file.camera | {key: given[key] for key in ("width", "height") if key in given}
-    if "width" not in values or "height" not in values:
-        raise InputError(
-            "image_width or image_height is missing", str(source),
-            f"add them, or write camera: {{file: {given['file']}, width: W, height: H}}",
-        )  # fmt: skip
-    return validate(Camera, values, str(source))
-
-
-def _projector_of(path: Path, given: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """Read the projector; what the rig says beside it counts more."""
-    source = path.parent / given["file"]
-    file, _ = read_camera_file(source)
-    if not file.projector:
-        raise InputError("holds no projector", str(source), "write its keys into the rig file")
-    values = file.projector | {key: value for key, value in given.items() if key != "file"}
-    focal = file.projector["focal"]["value"]
-    start = (
-        "focal length and pose are starts" if "pose" in values else "the focal length is a start"
-    )
-    notes.append(f"{source.name} gives the projector, focal length {focal:g}; its {start}.")
-    return values

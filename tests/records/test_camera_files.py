@@ -352,6 +352,9 @@ def test_camera_and_projector_in_one_file(tmp_path, moreno):
     assert notes[1] == (
         "c.xml gives the projector, focal length 300; its focal length and pose are starts."
     )
+    rig = rig.replace("file: c.xml, width: 128", "width: 128")
+    _, notes = read_rig(write(tmp_path / "rig.yaml", rig))
+    assert notes[1] == "c.xml holds a projector too, which projector: {file: c.xml} takes."
 
 
 PROCAMCALIB = """%YAML:1.0

@@ -7,12 +7,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import yaml
+from scipy.spatial.transform import Rotation
 
 from mitsuba_endo import backend
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.evaluate.depth import RayCaster, range_image
 from mitsuba_endo.records.calibration import Calibration
-from mitsuba_endo.records.rig import load_rig
+from mitsuba_endo.records.camera_files import read_camera_file
+from mitsuba_endo.records.rig import Camera, load_rig
 from mitsuba_endo.records.solution import Estimate, Solution, load_solution, save_solution
 from mitsuba_endo.records.surface import load_surface, save_surface
 from mitsuba_endo.show.exports import EXPORTERS, export
@@ -216,8 +219,114 @@ def test_unknown_value_is_named(name: str, tmp_path: Path, calibration: Calibrat
 
 def test_other_names_and_suffixes(result: Path, tmp_path: Path):
     """Oracle: the registry, and FileStorage's suffixes."""
-    assert set(EXPORTERS) == {"opencv", "colmap", "ply", "mitsuba"}
+    assert set(EXPORTERS) == {"opencv", "colmap", "ply", "mitsuba", "ros", "kalibr"}
     with pytest.raises(InputError, match=r"unknown format 'stl'"):
         export(result, "stl", tmp_path / "out.stl")
     with pytest.raises(InputError, match=r"unknown kind of file '\.txt'"):
         export(result, "opencv", tmp_path / "out.txt")
+
+
+BROWN = (-0.12, 0.03, 1e-3, -2e-3)
+CAMERAS = {
+    "opencv": BROWN, "opencv_fisheye": (0.02, -0.01, 0.004, -0.001), "omni": (0.7, *BROWN),
+    "double_sphere": (-0.2, 0.57), "scaramuzza": (0.0, -0.4),
+}  # fmt: skip
+
+
+def _seen_by(folder: Path, model: str) -> Path:
+    """Replace the camera's model in a solution folder."""
+    solution = load_solution(folder)
+    assert solution.camera is not None
+    camera = solution.camera.model_copy(update={"model": model, "distortion": [*CAMERAS[model]]})
+    save_solution(folder / "solution.json", solution.model_copy(update={"camera": camera}))
+    return folder
+
+
+def _check_camera(path: Path, folder: Path) -> None:
+    """Compare the camera of an exported file, read back, with the solution's at all its pixels."""
+    file, _ = read_camera_file(path)
+    camera = load_solution(folder).camera
+    assert camera is not None
+    read, own = Camera.model_validate(file.camera).to_model(), camera.to_model()
+    pixels = own.pixel_grid()
+    np.testing.assert_allclose(read.rays(pixels), own.rays(pixels), atol=1e-12)
+
+
+@pytest.mark.parametrize("model", ["opencv", "opencv_fisheye", "omni", "double_sphere"])
+def test_kalibr_projects_as_the_solution(pinhole: Path, tmp_path: Path, model: str):
+    """Oracle: the camera read back, and cv2.projectPoints with cam1 and T_cn_cnm1 in metres."""
+    export(_seen_by(pinhole, model), "kalibr", tmp_path / "chain.yaml")
+    _check_camera(tmp_path / "chain.yaml#cam0", pinhole)
+    projector = yaml.safe_load((tmp_path / "chain.yaml").read_text())["cam1"]
+    fu, fv, pu, pv = projector["intrinsics"]
+    T = np.array(projector["T_cn_cnm1"])
+    K, lens = (
+        np.array([[fu, 0, pu], [0, fv, pv], [0, 0, 1]]),
+        np.array(projector["distortion_coeffs"]),
+    )
+    q, _ = cv2.projectPoints(
+        POINTS / 1000, cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], K, np.array(lens)
+    )
+    np.testing.assert_allclose(q[:, 0], _expected(pinhole, 0), atol=1e-9)
+
+
+@pytest.mark.parametrize("model", ["opencv", "opencv_fisheye"])
+def test_ros_projects_as_the_solution(pinhole: Path, tmp_path: Path, model: str):
+    """Oracle: both cameras read back, and the projector's pose from the quaternion, in metres."""
+    export(_seen_by(pinhole, model), "ros", tmp_path / "ros")
+    _check_camera(tmp_path / "ros" / "camera.yaml", pinhole)
+    file, note = read_camera_file(tmp_path / "ros" / "projector.yaml")
+    assert "ROS camera_info" in note
+    stamped = yaml.safe_load((tmp_path / "ros" / "transform.yaml").read_text())
+    assert (stamped["header"]["frame_id"], stamped["child_frame_id"]) == ("camera", "projector")
+    turn, shift = stamped["transform"]["rotation"], stamped["transform"]["translation"]
+    R = Rotation.from_quat([turn[k] for k in "xyzw"]).as_matrix()
+    local = (POINTS / 1000 - [shift[k] for k in "xyz"]) @ R  # X_projector = R^T (X_camera - t)
+    q, _ = cv2.projectPoints(local, np.zeros(3), np.zeros(3), np.array(file.camera["K"]),
+                             np.array(file.camera["distortion"]))  # fmt: skip
+    np.testing.assert_allclose(q[:, 0], _expected(pinhole, 0), atol=1e-9)
+
+
+def test_opencvs_omnidir_is_read_back(pinhole: Path, tmp_path: Path):
+    """Oracle: the camera's rays."""
+    export(_seen_by(pinhole, "omni"), "opencv", tmp_path / "c.yaml")
+    _check_camera(tmp_path / "c.yaml", pinhole)
+
+
+@pytest.mark.parametrize(
+    ("model", "formats"),
+    [
+        ("scaramuzza", ("opencv", "colmap", "ros", "kalibr")),
+        ("double_sphere", ("opencv", "colmap", "ros")),
+        ("omni", ("colmap", "ros")),
+    ],
+)
+def test_cameras_that_a_format_lacks_are_refused(pinhole: Path, tmp_path: Path, model, formats):
+    """Oracle: the model's name, and no file."""
+    _seen_by(pinhole, model)
+    for name in formats:
+        with pytest.raises(InputError, match=f"has no camera like the model {model}"):
+            export(pinhole, name, tmp_path / "out.yaml")
+        assert not (tmp_path / "out.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["ros", "kalibr"])
+def test_robots_formats_have_pinhole_projectors_only(result: Path, tmp_path: Path, name: str):
+    """Oracle: the law's name."""
+    with pytest.raises(InputError, match="has no camera like the law direction_cosine"):
+        export(result, name, tmp_path / "out.yaml")
+
+
+def test_a_fifth_coefficient_is_not_dropped(pinhole: Path, tmp_path: Path):
+    """Oracle: Kalibr refuses k3, ROS takes eight coefficients."""
+    solution = load_solution(pinhole)
+    assert solution.camera is not None
+    lens = [*BROWN, 5e-3, 0.01, 0.002, 1e-4]
+    camera = solution.camera.model_copy(update={"model": "opencv", "distortion": lens})
+    save_solution(pinhole / "solution.json", solution.model_copy(update={"camera": camera}))
+    with pytest.raises(InputError, match="Kalibr has four coefficients only"):
+        export(pinhole, "kalibr", tmp_path / "chain.yaml")
+    export(pinhole, "ros", tmp_path / "ros")
+    file, _ = read_camera_file(tmp_path / "ros" / "camera.yaml")
+    assert file.camera["distortion"] == lens
+    assert file.named == "rational_polynomial"

@@ -1,6 +1,16 @@
 """Solutions in the formats of other programs, one file an exporter."""
 
-from . import colmap, mitsuba_scene, opencv, ply
+from . import colmap, kalibr, mitsuba_scene, opencv, ply, ros
 from .registry import EXPORTERS, Exporter, export
 
-__all__ = ["EXPORTERS", "Exporter", "colmap", "export", "mitsuba_scene", "opencv", "ply"]
+__all__ = [
+    "EXPORTERS",
+    "Exporter",
+    "colmap",
+    "export",
+    "kalibr",
+    "mitsuba_scene",
+    "opencv",
+    "ply",
+    "ros",
+]

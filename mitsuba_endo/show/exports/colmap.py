@@ -17,7 +17,15 @@ from ...geometry.transforms import RigidTransform
 from ...records.solution import Solution
 from ...records.surface import load_surface
 from ..map_names import observed_names, own_surface_name
-from .known import camera_in, camera_pose, known_camera, known_projector, known_size, projector_pose
+from .known import (
+    camera_in,
+    camera_pose,
+    known_camera,
+    known_projector,
+    known_size,
+    pinhole_only,
+    projector_pose,
+)
 from .registry import register_exporter
 from .tracks import Sightings, sightings
 
@@ -43,11 +51,7 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
         InputError: a value was not determined, COLMAP has no camera like the camera's model or
             the projector's law (it has ``pinhole`` only), or the folder cannot be written.
     """
-    if solution.projector.law != "pinhole":
-        raise InputError(
-            f"COLMAP has no camera like the law {solution.projector.law}", "projector.law",
-            "use --format opencv",
-        )  # fmt: skip
+    pinhole_only(solution, "COLMAP")
     if solution.surface is None:
         raise InputError("surface is missing", "solution.json", "calibrate again")
     points, seen = _points(solution, folder)

@@ -34,6 +34,24 @@ def camera_in(camera: CameraModel, names: dict[str, str], program: str) -> str:
     return names[camera.model]
 
 
+def pinhole_only(solution: Solution, program: str) -> None:
+    """Refuse a projector that is no pinhole, for programs whose cameras all are.
+
+    Raises:
+        InputError: names the law.
+    """
+    if solution.projector.law != "pinhole":
+        raise InputError(
+            f"{program} has no camera like the law {solution.projector.law}", "projector.law",
+            "use --format opencv",
+        )  # fmt: skip
+
+
+def metres(solution: Solution, pose: RigidTransform) -> list[float]:
+    """Return a translation in metres; in baselines, as it is, if the solution is up to scale."""
+    return (pose.t * (1e-3 if solution.units == "mm" else 1.0)).tolist()
+
+
 def known_projector(solution: Solution, frame: Frame) -> ProjectorModel:
     """Return the projector's intrinsics in a frame, which may have a focal length of its own.
 
