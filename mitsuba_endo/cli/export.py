@@ -9,9 +9,12 @@ from .console import Debug, Json, Quiet, session
 from .options import Result
 
 Format = Annotated[
-    str, typer.Option("--format", metavar="NAME", help="opencv, colmap, ply or mitsuba.")
+    str,
+    typer.Option("--format", metavar="NAME", help="opencv, ros, kalibr, colmap, ply or mitsuba."),
 ]
-Out = Annotated[Path, typer.Option("--out", help="File to write; a folder for colmap and mitsuba.")]
+Out = Annotated[
+    Path, typer.Option("--out", help="File to write; a folder for ros, colmap and mitsuba.")
+]
 
 
 def export(

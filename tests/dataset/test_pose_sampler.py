@@ -111,3 +111,18 @@ def test_a_lens_that_folds_the_image_is_refused():
     ranges = Config.model_validate({"camera": {"fov": 100, "distortion": [-1.0, 0.0]}}).camera
     with pytest.raises(InputError, match=r"camera\.distortion: folds the image"):
         draw_camera(ranges, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion"),
+    [("opencv", [0.0] * 4), ("opencv_fisheye", [0.0] * 4), ("omni", [0.8, 0, 0, 0, 0]),
+     ("double_sphere", [-0.2, 0.57]), ("scaramuzza", [0, -0.4, 0.05, -0.05])],
+)  # fmt: skip
+def test_every_camera_model_has_the_drawn_field_of_view(model, distortion):
+    """Oracle: the angle between the rays of the left and right edges of the middle row."""
+    keys = {"model": model, "fov": 110, "distortion": distortion, "centre": 0, "aspect": 1}
+    ranges = Config.model_validate({"camera": keys}).camera
+    camera = draw_camera(ranges, np.random.default_rng(0))
+    middle = (camera.height - 1) / 2
+    left, right = camera.rays(np.array([[-0.5, middle], [camera.width - 0.5, middle]]))
+    assert np.degrees(np.arccos(left @ right)) == pytest.approx(110, abs=1e-6)

@@ -131,16 +131,29 @@ def test_scene_renders_as_it_is(written: Path):
     assert 0.3 < np.percentile(image, 95) < 2
 
 
-def test_fisheye_scene_renders_the_same_coordinates(
-    tmp_path: Path, calibration: Calibration, no_pictures: None
+@pytest.mark.parametrize(
+    ("model", "coefficients"),
+    [
+        ("opencv_fisheye", (0.05, -0.01, 0.002, 0.0)),
+        ("omni", (0.2, -0.05, 0.01, 1e-3, -1e-3)),
+        ("double_sphere", (-0.2, 0.57)),
+        ("scaramuzza", (0.01, -0.4, 0.05, -0.05, 2e-3, -1e-3)),
+    ],
+)
+def test_wide_angle_scene_renders_the_same_coordinates(
+    tmp_path: Path,
+    calibration: Calibration,
+    no_pictures: None,
+    model: str,
+    coefficients: tuple[float, ...],
 ):
-    """Oracle: NumPy's fisheye camera meeting a sphere's mesh; projector coordinates to 1e-2 px."""
+    """Oracle: NumPy's camera meeting a sphere's mesh; projector coordinates to 1e-2 px."""
     import mitsuba as mi
 
     from mitsuba_endo.evaluate.depth import RayCaster, range_image
 
     K = np.array([[25.0, 0, 30], [0, 26, 24], [0, 0, 1]])
-    camera = CameraModel("opencv_fisheye", 64, 46, K, (0.05, -0.01, 0.002, 0.0))
+    camera = CameraModel(model, 64, 46, K, coefficients)
     surface = calibration.surface
     points = camera.rays(camera.pixel_grid())
     points = points * range_image(RayCaster(surface.vertices, surface.faces), camera)[..., None]
