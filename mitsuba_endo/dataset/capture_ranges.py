@@ -25,7 +25,9 @@ TISSUE: Ranges = {
     "mean_free_path": uniform(0.1, 0.4),
     "seed": uniform(0, 999_999),
 }
+"""Units are those of :class:`~mitsuba_endo.capture.settings.Tissue`; about its defaults."""
 LIGHT: Ranges = {"lamp": choose(0.0, 0.0, 0.01, 0.03, 0.1)}
+"""Relative to the pattern; off in two of five."""
 EFFECTS: Ranges = {
     "vignetting": uniform(0.3, 1.2),
     "defocus": uniform(0.2, 0.8),
@@ -38,6 +40,7 @@ EFFECTS: Ranges = {
     "read_noise": uniform(3.0, 25.0),
     "jpeg_quality": choose(None, None, 90, 70),
 }
+"""Units are those of :class:`~mitsuba_endo.capture.settings.Effects`; from clean to moderate."""
 
 
 class CaptureRanges(Section):

@@ -13,8 +13,9 @@ from ..geometry.endoscope import Endoscope
 from ..geometry.laws import ProjectorModel
 from ..rendering.synthetic import MeshScene
 from ..shapes.mesh import Mesh
-from .config import PoseRules, ProjectorRanges, ViewRanges
+from .config import PoseRules, ProjectorRanges
 from .optics import draw_projector_pose
+from .scene_ranges import ViewRanges
 from .view_sampler import ViewSampler
 
 COARSE = 40

@@ -16,9 +16,10 @@ from ..files import atomic_path
 from ..litter import sweep
 from ..records.validation import read_json
 from .asset_cache import clear_assets
-from .config import FILE, Config
+from .config import Config
 from .contents import Store, numbered
 from .digests import array_digest
+from .scene_ranges import FILE
 from .work import DatasetJob, Result
 
 SCHEMA = 1

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from ..shapes import Mesh, Polyp, make_shape, parameter_names, parse_shape
 from ..shapes.colon import Colon
 from .asset_cache import FIGURE, AssetCache
-from .config import FILE, LUMEN, Polyps, Scene
 from .ranges import draw_all
+from .scene_ranges import FILE, LUMEN, Polyps, Scene
 from .view_sampler import LumenViews, MeshViews, SheetViews, ViewSampler
 
 LARGEST_POLYP = 0.6

@@ -14,7 +14,7 @@ from ..records.surface import load_surface
 from ..rendering.scene_surfaces import scene_mesh
 from ..rendering.synthetic import MeshScene
 from ..shapes.mesh import Mesh
-from .config import Scene
+from .scene_ranges import Scene
 
 MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
 """Millimetres in each unit."""

@@ -11,8 +11,8 @@ from ..geometry.transforms import RigidTransform, tangent_basis
 from ..rendering.synthetic import MeshScene
 from ..shapes.colon import Colon
 from ..shapes.mesh import Mesh
-from .config import ViewRanges
 from .optics import rotation_from_angles
+from .scene_ranges import ViewRanges
 
 Array = NDArray[np.float64]
 DIRECTIONS = 64

@@ -14,6 +14,7 @@ farther away."""
 SHARP = 0.3
 """Standard deviation, pixels, below which a blur would change nothing."""
 _RATIO = float(np.sqrt(VARIANCES[1] / VARIANCES[0]))
+"""Of the widths of neighbouring Gaussians of the profile."""
 
 
 def spread(

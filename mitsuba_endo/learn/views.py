@@ -24,6 +24,7 @@ LATTICE_UNIT = 1e-3
 UNLIT = -32768
 """Stored coordinate of a shadow: the least of 16 bits, its own negative."""
 BIT_MIXED, BIT_EDGE, BIT_HIT = 1, 2, 4
+"""Bits of a pixel's flags: no one truth, a depth edge, surface at all its samples."""
 
 
 @dataclass(frozen=True, eq=False)

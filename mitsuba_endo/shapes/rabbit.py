@@ -19,9 +19,10 @@ from mitsuba_endo.shapes.surface_nets import mesh_field
 
 Array = NDArray[np.float64]
 
-# The figure's own frame: x to the nose, y up, z to its left, about 66 units high.
 LOW, HIGH = np.array([-28.0, -2.5, -20.0]), np.array([27.0, 67.0, 20.0])
+"""Corners of a box around it, in its own frame: x to the nose, y up, z to its left."""
 MIDDLE = np.array([0.0, 32.0, 0.0])
+"""Point that is put on the camera's axis, in its own frame."""
 UNITS_HIGH = 66.0
 """From the feet to the tips of the ears, in the figure's units."""
 

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.dataset.config import Config, PoseRules, ViewRanges
+from mitsuba_endo.dataset.config import Config, PoseRules
 from mitsuba_endo.dataset.optics import draw_camera, draw_projector, draw_projector_pose
 from mitsuba_endo.dataset.pose_sampler import PoseSampler, clearance
+from mitsuba_endo.dataset.scene_ranges import ViewRanges
 from mitsuba_endo.dataset.view_sampler import LumenViews, MeshViews, SheetViews
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform

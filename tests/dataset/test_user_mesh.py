@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from mitsuba_endo.dataset.config import Scene
 from mitsuba_endo.dataset.run import failures
+from mitsuba_endo.dataset.scene_ranges import Scene
 from mitsuba_endo.dataset.user_mesh import load_user_mesh, note
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.rendering.scene_surfaces import scene_mesh

@@ -1,6 +1,5 @@
 """Camera files of other programs: the numbers that each of them means, or a refusal by name."""
 
-import json
 from pathlib import Path
 
 import cv2
@@ -9,45 +8,23 @@ import pytest
 import yaml
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.records.camera_files import FORMATS, read_camera_file
-from mitsuba_endo.records.rig import Camera, load_rig, read_rig
+from mitsuba_endo.records.camera_files import read_camera_file
+from mitsuba_endo.records.rig import load_rig, read_rig
+from tests.records.camera_file_inputs import (
+    BROWN,
+    FLAT,
+    PINHOLE,
+    K,
+    camera_of,
+    check,
+    kalibr,
+    ros,
+    storage,
+    write,
+)
 
 FIELD = Path(__file__).parents[3] / "shared" / "field"
 KAMINO = Path(__file__).parents[3] / "shared" / "real" / "kamino" / "calibration_result.xml"
-K = [[200.5, 0.0, 120.4], [0.0, 199.0, 88.6], [0.0, 0.0, 1.0]]
-FLAT = [v for row in K for v in row]
-BROWN = [-0.1, 0.02, 0.001, -0.002, 0.003]
-
-
-def write(path: Path, content: object) -> Path:
-    """Write text as it is, and values as JSON or YAML by the suffix."""
-    if not isinstance(content, str):
-        content = json.dumps(content) if path.suffix == ".json" else yaml.safe_dump(content)
-    path.write_text(content)
-    return path
-
-
-def storage(path: Path, **values: object) -> Path:
-    """Write an OpenCV FileStorage with OpenCV's own writer."""
-    file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-    for name, value in values.items():
-        file.write(name, np.array(value, float) if isinstance(value, list) else value)
-    file.release()
-    return path
-
-
-def camera_of(path: Path) -> Camera:
-    file, _ = read_camera_file(path)
-    return Camera.model_validate({"width": 240, "height": 180, **file.camera})
-
-
-def check(camera: Camera, model: str = "opencv", distortion: list[float] = BROWN) -> None:
-    """Compare with K, 240 x 180 pixels, and the coefficients up to zeros at the end."""
-    assert camera.model == model
-    assert (camera.width, camera.height) == (240, 180)
-    np.testing.assert_allclose(camera.K, K, rtol=1e-12)
-    padded = [*camera.distortion, *[0.0] * 8][:8]
-    np.testing.assert_allclose(padded, [*distortion, *[0.0] * 8][:8], rtol=1e-9)
 
 
 @pytest.mark.parametrize("suffix", ["yaml", "xml", "json"])
@@ -128,17 +105,6 @@ def test_longer_lists_with_zeros_at_the_end(tmp_path, count):
         read_camera_file(bad)
 
 
-def ros(**changes: object) -> dict[str, object]:
-    return {
-        "image_width": 240, "image_height": 180, "camera_name": "head",
-        "camera_matrix": {"rows": 3, "cols": 3, "data": FLAT}, "distortion_model": "plumb_bob",
-        "distortion_coefficients": {"rows": 1, "cols": 5, "data": BROWN},
-        "rectification_matrix": {"rows": 3, "cols": 3, "data": [1, 0, 0, 0, 1, 0, 0, 0, 1]},
-        "projection_matrix": {"rows": 3, "cols": 4, "data": [0.0] * 12},
-        **changes,
-    }  # fmt: skip
-
-
 @pytest.mark.parametrize("head", ["", "%YAML:1.0\n---\n"])
 def test_ros_camera_info(tmp_path, head):
     """Oracle: the numbers, with ROS's head and with OpenCV's."""
@@ -164,16 +130,6 @@ def test_a_printed_ros_message(tmp_path, names):
     data["binning_x"] = 2
     with pytest.raises(InputError, match="binning_x is 2"):
         read_camera_file(write(tmp_path / "b.yaml", data))
-
-
-def kalibr(model: str, intrinsics: list[float], lens: str, coefficients: list[float]) -> dict:
-    return {
-        "camera_model": model, "intrinsics": intrinsics, "distortion_model": lens,
-        "distortion_coeffs": coefficients, "resolution": [240, 180], "rostopic": "/head",
-    }  # fmt: skip
-
-
-PINHOLE = [200.5, 199.0, 120.4, 88.6]
 
 
 @pytest.mark.parametrize(
@@ -285,6 +241,14 @@ def test_orb_slam(tmp_path, kind, model, third, fourth):
     check(camera_of(write(tmp_path / "c.yaml", text)), model, BROWN[:4])
     with pytest.raises(InputError, match="the key 'k9' beside fx is not known"):
         camera_of(write(tmp_path / "d.yaml", text.replace("Camera1.k2", "Camera1.k9")))
+
+
+def test_one_key_a_number(tmp_path):
+    """Oracle: the numbers; coefficients in one list, and a double sphere's by name."""
+    flat = {"fx": 200.5, "fy": 199.0, "cx": 120.4, "cy": 88.6, "width": 240, "height": 180}
+    check(camera_of(write(tmp_path / "a.json", flat | {"coeffs": BROWN})))
+    sphere = {"model": "ds", "xi": -0.2, "alpha": 0.57}
+    check(camera_of(write(tmp_path / "b.json", flat | sphere)), "double_sphere", [-0.2, 0.57])
 
 
 OCAM = """#polynomial coefficients for the DIRECT mapping function (ocam_model.ss in MATLAB).
@@ -401,85 +365,6 @@ def test_procamcalib(tmp_path):
     np.testing.assert_allclose(at, [9.0, -1.0, 20.0], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"K": K, "k_1": -0.1}, "the key 'k_1' beside K is not known"),
-        ({"K": K, "k1": -0.1, "k2": 0.1}, "the key 'k1' beside K is not known"),
-        ({"K": K, "p1": 1e-3}, "the key 'p1' beside K is not known"),
-        ({"camera_matrix": K, "lens_parameters": BROWN}, "the key 'lens_parameters' beside camera"),
-        ({"K": K, "k": BROWN}, "the key 'k' beside K is not known"),
-        ({"K": K, "D": BROWN, "dist": BROWN}, "the keys 'D' and 'dist' are both distortion"),
-        ({"K": K, "D": BROWN, "model": "fov"}, "the camera model 'fov' is not known"),
-        ({"K": K, "D": BROWN, "model": "none"}, "the model is 'none', and coefficients follow"),
-        ({"K": K, "D": [*BROWN[:4], 1e-3], "model": "fisheye"}, "coefficient 5 is 0.001, and the"),
-        ({"K": K, "D": "strong"}, "is not a list of numbers, got 'strong'"),
-        (
-            {"fx": 1.0, "fy": 1.0, "cx": 0, "cy": 0, "k7": 1.0},
-            "the key 'k7' beside fx is not known",
-        ),
-        ({"fx": 1.0, "fy": 1.0, "cx": 0, "cy": 0, "skew": 1.0}, "the key 'skew' beside fx"),
-        ({"fx": 1.0, "fy": 1.0, "cx": 0, "cy": 0, "D": BROWN, "k1": 1.0}, "the key 'k1' beside D"),
-        ({"fx": 1.0, "fy": 1.0}, "cx or cy is missing"),
-        ({"cam0": kalibr("eucm", [0.5, 1, *PINHOLE], "none", [])}, "the camera model 'eucm'"),
-        ({"cam0": kalibr("pinhole", PINHOLE, "fov", [0.9])}, "the camera model 'fov'"),
-        ({"cam0": kalibr("ds", [-0.2, 0.5, *PINHOLE], "radtan", [0.1])}, "is ds with radtan"),
-        ({"cam0": kalibr("ds", PINHOLE, "none", [])}, "ds has 6 intrinsics"),
-        ({"cam0": kalibr("pinhole", PINHOLE, "none", []) | {"k": 1}}, "the key 'k' is not known"),
-        ("1 FOV 240 180 200 200 120 90 0.9\n", "the camera model 'FOV' is not known"),
-        ("1 OPENCV 240 180 200 200 120 90 0.9\n", "OPENCV has 8 parameters, not 5"),
-        ("1 PINHOLE 240 180 1 1 1 1\n2 PINHOLE 240 180 1 1 1 1\n", "holds the cameras 1, 2"),
-        ("just words", "is not an OpenCV FileStorage or another camera file"),
-        ({"some": "thing"}, "camera_matrix is missing"),
-    ],
-)
-def test_what_is_not_known_is_refused_by_name(tmp_path, content, message):
-    """Oracle: the sentence names the key, the model or the coefficient, and the file."""
-    path = write(tmp_path / "c.yaml", content)
-    with pytest.raises(InputError) as caught:
-        read_camera_file(path)
-    assert message in str(caught.value)
-    assert str(path) in str(caught.value.where)
-
-
-@pytest.mark.parametrize(
-    ("camera", "message"),
-    [
-        ("{file: c.yaml}", "image_width or image_height is missing; add them, or write camera:"),
-        ("{file: c.yaml, width: 240, height: 180, fx: 3}", "camera.fx: unknown key beside file"),
-        ("{file: s.yaml, width: 241, height: 180}", "camera.width: is 241, and 240 in s.yaml"),
-    ],
-)
-def test_the_rig_adds_the_size_and_nothing_else(tmp_path, camera, message):
-    """Oracle: the sentence."""
-    write(tmp_path / "c.yaml", {"K": K})
-    write(tmp_path / "s.yaml", {"K": K, "image_size": [240, 180]})
-    rig = write(tmp_path / "rig.yaml", f"camera: {camera}\nprojector: {{width: 9, height: 9}}\n")
-    with pytest.raises(InputError) as caught:
-        load_rig(rig)
-    assert message in str(caught.value)
-    text = rig.read_text().replace(camera, "{file: c.yaml, width: 240, height: 180}")
-    check(load_rig(write(rig, text)).camera, distortion=[])
-    text = text.replace("{width: 9, height: 9}", "{file: c.yaml, width: 9, height: 9}")
-    with pytest.raises(InputError, match="holds no projector"):
-        load_rig(write(rig, text))
-
-
-def test_a_note_says_what_was_read(tmp_path):
-    """Oracle: the sentence, for a file that names its model and one that does not."""
-    write(tmp_path / "c.yaml", ros())
-    _, (note,) = read_rig(
-        write(tmp_path / "rig.yaml", "camera: c.yaml\nprojector: {width: 9, height: 9}\n")
-    )
-    assert note == (
-        "c.yaml is read as ROS camera_info: camera model opencv, as it says (plumb_bob); fx 200.5, "
-        "fy 199, cx 120.4, cy 88.6, coefficients k1 -0.1, k2 0.02, p1 0.001, p2 -0.002, k3 0.003."
-    )
-    _, silent = read_camera_file(write(tmp_path / "d.json", {"K": K}))
-    assert "camera model opencv, the file names no model;" in silent
-    assert silent.endswith("no distortion.")
-
-
 @pytest.mark.skipif(not FIELD.is_dir(), reason="the inputs of the field are not here")
 @pytest.mark.parametrize(
     ("name", "model", "K", "distortion"),
@@ -517,10 +402,3 @@ def test_kaminos_own_file():
     assert file.camera["K"][1][2] == pytest.approx(521.44602565518824)
     assert file.projector["centre"] == pytest.approx([737.17018407542582, 1357.8282322407788])
     assert "k3 3.12546" in note
-
-
-def test_every_format_is_in_the_manual():
-    """Oracle: the table in docs/rig.md."""
-    text = (Path(__file__).parents[2] / "docs" / "rig.md").read_text()
-    for name in FORMATS:
-        assert f"| {name} |" in text, name

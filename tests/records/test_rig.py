@@ -218,6 +218,13 @@ def test_missing_binary_or_folder(tmp_path: Path):
         load_rig(tmp_path)
 
 
+def test_kannala_brandt_is_opencvs_fisheye(tmp_path: Path):
+    """Oracle: OpenCV's name of the same polynomial."""
+    data = _data()
+    data["camera"] |= {"model": "kannala_brandt", "distortion": [0.1, 0.02]}
+    assert _load(tmp_path, data).camera.model == "opencv_fisheye"
+
+
 def test_camera_survives_model_and_back(tmp_path: Path):
     """Oracle: the identity."""
     camera = _load(tmp_path, _data()).camera

@@ -11,6 +11,7 @@ from .registry import register_camera
 _NEWTON_STEPS = 12
 """From the angle itself as the radius: quadratic, so that rounding remains well before."""
 _TERMS = 6
+"""b1 to b4, d, e."""
 
 
 @register_camera

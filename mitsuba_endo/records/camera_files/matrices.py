@@ -8,7 +8,7 @@ from typing import Any
 from ...errors import InputError
 from .camera_file import CameraFile, Values, camera_file, numbers, square
 from .document import Document
-from .lenses import plain
+from .lenses import LENS_NAMES, lens_of, plain
 from .registry import register_format
 
 MATRIX = (
@@ -24,7 +24,7 @@ DISTORTION = (
 )  # fmt: skip
 WIDTH = ("imagewidth", "width", "imgwidth", "w", "camerawidth", "resolutionx")
 HEIGHT = ("imageheight", "height", "imgheight", "h", "cameraheight", "resolutiony")
-SIZE = ("imagesize", "imgsize", "resolution", "size", "imagesizewh", "camerasize")
+SIZE = ("imagesize", "imgsize", "resolution", "size", "camerasize", "cameraresolution")
 """Width and height in this order, as OpenCV writes its ``Size``."""
 SHAPE = ("imgshape", "imageshape")
 """Height and width in this order, as NumPy has it."""
@@ -48,7 +48,8 @@ HARMLESS = frozenset({
     "aspectratio", "fixaspectratio", "flags", "calibrationflags", "avgreprojectionerror",
     "reprojectionerror", "meanreprojectionerror", "meanerror", "rms", "rmserror", "error", "rmse",
     "perviewreprojectionerrors", "perviewerrors", "perviewavgreprojectionerror", "stdintrinsics",
-    "stddeviations", "stdextrinsics", "calibrationerror", "totalerror", "camerror", "projerror",
+    "stddeviations", "stdextrinsics", "cameramatrixstddev", "distcoeffsstddev",
+    "calibrationerror", "totalerror", "camerror", "projerror",
     "stereoerror", "ret", "retval",
     # Of a second device and of rectification
     "rotation", "translation", "cameramatrix2", "distcoeffs2", "essentialmatrix",
@@ -108,14 +109,26 @@ def image_size(data: Values, where: str) -> tuple[int, int] | None:
     return None
 
 
-def model_name(data: Values) -> str:
-    """Return how the file calls its model; OpenCV's own samples say ``fisheye_model: 1``."""
-    fisheye = find(data, ("fisheyemodel", "fisheye"))
-    if fisheye and isinstance(data[fisheye], int | float) and data[fisheye]:
-        return "fisheye"
+def model_name(data: Values, where: str) -> str:
+    """Return how the file calls its model; OpenCV's own samples say ``fisheye_model: 1``.
+
+    Raises:
+        InputError: two of its keys contradict each other.
+    """
     key = find(data, MODEL)
     named = str(data[key]) if key else ""
-    return "omni" if not named and find(data, (XI,)) else named
+    flag = find(data, ("fisheyemodel", "fisheye"))
+    fisheye = flag is not None and isinstance(data[flag], int | float) and bool(data[flag])
+    implied = "fisheye" if fisheye else "omni" if find(data, (XI,)) else ""
+    if named and implied:
+        model = lens_of(named, where)
+        fits = model == "opencv_fisheye" if fisheye else XI in LENS_NAMES[model]
+        if not fits:
+            raise InputError(
+                f"the model is '{named}', and {flag if fisheye else XI} beside it says {implied}",
+                where, "remove what is wrong",
+            )  # fmt: skip
+    return named or implied
 
 
 def read_matrices(
@@ -145,7 +158,7 @@ def read_matrices(
     coefficients = (
         numbers(content(data[distortion]), f"{where}: {distortion}") if distortion else []
     )
-    named = model_name(data)
+    named = model_name(data, where)
     if xi:
         coefficients = [*numbers(content(data[xi]), f"{where}: {xi}")[:1], *coefficients]
     K = square(content(data[key]), f"{where}: {key}")

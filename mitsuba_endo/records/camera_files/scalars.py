@@ -57,7 +57,7 @@ def read(document: Document) -> CameraFile:
     cx, cy = (find(data, names) for names in _CENTRE.values())
     if not cx or not cy:
         raise InputError("cx or cy is missing", where, "add it")
-    named = model_name(data)
+    named = model_name(data, where)
     names = LENS_NAMES[lens_of(named, where)]
     spelt = {plain(key): key for key in data}
     single = [spelt[plain(name)] for name in names if plain(name) in spelt]
