@@ -1,5 +1,6 @@
 """Camera files that are refused by name, what is told of the others, and the manual's tables."""
 
+import json
 import re
 from pathlib import Path
 
@@ -100,6 +101,49 @@ def test_a_note_says_what_was_read(tmp_path):
     _, silent = read_camera_file(write(tmp_path / "d.json", {"K": K}))
     assert "camera model opencv, the file names no model;" in silent
     assert silent.endswith("no distortion.")
+
+
+WRONG = [None, "x", [], {}, -1, 1e308, float("nan"), [1, [2]], True, [None] * 9, [[1, 2, 3]] * 3]
+
+
+def parts(value: object, path: tuple = ()) -> list[tuple]:
+    """Return the paths of all parts of nested mappings and lists."""
+    if isinstance(value, dict | list):
+        inner = value.items() if isinstance(value, dict) else enumerate(value)
+        return [path, *(p for key, part in inner for p in parts(part, (*path, key)))]
+    return [path]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        ros(), {"cam0": kalibr("ds", [-0.2, 0.57, *PINHOLE], "none", [])},
+        {"K": K, "dist": BROWN, "image_size": [240, 180]},
+        {"RadialDistortion": [0.1, 0.2], "FocalLength": [1.0, 2.0], "PrincipalPoint": [3.0, 4.0],
+         "ImageSize": [5, 6]},
+        {"fx": 1.0, "fy": 2.0, "cx": 3.0, "cy": 4.0, "k1": 0.1, "width": 5, "height": 6},
+        {"cam_int": K, "cam_dist": BROWN, "proj_int": K, "rotation": K, "translation": [1, 2, 3.0]},
+        {"Cameras": ["C"], "Projectors": ["P"], "C": {"cameraMatrix": K, "R": K, "T": [1, 2, 3]},
+         "P": {"cameraMatrix": K, "R": K, "T": [1, 2, 3]}},
+    ],
+)  # fmt: skip
+def test_any_part_may_be_wrong(tmp_path, content):
+    """Oracle: a refusal in a sentence, or a camera; never another exception."""
+    rig = "camera: {file: c.json, width: 240, height: 180}\nprojector: {width: 9, height: 9}\n"
+    write(tmp_path / "rig.yaml", rig)
+    refused = 0
+    for number, path in enumerate(parts(content)[1:]):
+        broken = json.loads(json.dumps(content))
+        part = broken
+        for key in path[:-1]:
+            part = part[key]
+        part[path[-1]] = WRONG[number % len(WRONG)]
+        write(tmp_path / "c.json", broken)
+        try:
+            load_rig(tmp_path / "rig.yaml")
+        except InputError:
+            refused += 1
+    assert refused > 3
 
 
 def test_the_manual_names_every_format_and_name():

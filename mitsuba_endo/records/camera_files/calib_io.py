@@ -34,9 +34,9 @@ def read(document: Document) -> CameraFile:
         size = held["CameraModelCRT"]["CameraModelBase"]["imageSize"]
         f, ar, cx, cy = (values.pop(name) for name in ("f", "ar", "cx", "cy"))
         width, height = int(size["width"]), int(size["height"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"lacks {error}", where, "export it again") from None
-    if kind not in _MODELS:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        raise InputError("lacks a part of the camera", where, "export it again") from None
+    if kind not in list(_MODELS):
         raise InputError(
             f"the camera model '{kind}' is not known", where, "calibrate with OpenCV's"
         )

@@ -72,11 +72,11 @@ def matrix(fx: float, fy: float, cx: float, cy: float) -> list[list[float]]:
     return [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
 
 
-def numbers(value: Any, where: str) -> list[float]:
-    """Return a list of finite or infinite numbers in one row.
+def numbers(value: Any, where: str, count: int | None = None) -> list[float]:
+    """Return nested lists of numbers in one row.
 
     Raises:
-        InputError: it is none.
+        InputError: it is none, or not so many.
     """
     flat: list[float] = []
     for item in value if isinstance(value, list | tuple) else [value]:
@@ -84,7 +84,21 @@ def numbers(value: Any, where: str) -> list[float]:
             flat += numbers(item, where)
         else:
             flat.append(_number(item, where))
+    if count is not None and len(flat) != count:
+        raise InputError(f"has {len(flat)} numbers, not {count}", where, "mend the value")
     return flat
+
+
+def pixels(value: Any, where: str) -> tuple[int, int]:
+    """Return two numbers of pixels.
+
+    Raises:
+        InputError: they are not two whole numbers.
+    """
+    first, second = numbers(value, where, 2)
+    if not (first.is_integer() and second.is_integer()):
+        raise InputError(f"is {first:g} x {second:g} pixels", where, "give whole numbers")
+    return int(first), int(second)
 
 
 def _number(value: Any, where: str) -> float:
@@ -103,7 +117,5 @@ def square(value: Any, where: str) -> list[list[float]]:
     Raises:
         InputError: they are not nine.
     """
-    flat = numbers(value, where)
-    if len(flat) != 9:
-        raise InputError(f"has {len(flat)} numbers, not 9", where, "give a 3 x 3 camera matrix")
+    flat = numbers(value, where, 9)
     return [flat[0:3], flat[3:6], flat[6:9]]

@@ -3,7 +3,7 @@
 import re
 
 from ...errors import InputError
-from .camera_file import CameraFile, camera_file, matrix
+from .camera_file import CameraFile, camera_file, matrix, numbers
 from .document import Document
 from .registry import chosen, register_format
 
@@ -56,7 +56,7 @@ def read(document: Document) -> CameraFile:
         raise InputError(
             f"{kind} has {focals + 2 + len(places)} parameters, not {len(texts)}", where, "mend it"
         )
-    values = [float(text) for text in texts]
+    values = numbers(texts, where)
     fx, fy = values[0], values[focals - 1]
     cx, cy = (c - _PIXEL_CENTRE for c in values[focals : focals + 2])
     return camera_file(matrix(fx, fy, cx, cy), values[focals + 2 :], (width, height), model, where)

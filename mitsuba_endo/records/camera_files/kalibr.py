@@ -3,7 +3,7 @@
 import re
 
 from ...errors import InputError
-from .camera_file import CameraFile, Values, camera_file, matrix, numbers
+from .camera_file import CameraFile, Values, camera_file, matrix, numbers, pixels
 from .document import Document
 from .registry import chosen, register_format
 
@@ -48,11 +48,9 @@ def read(document: Document) -> CameraFile:
     if len(values) != _LEADING[kind] + 4:
         raise InputError(f"{kind} has {_LEADING[kind] + 4} intrinsics", where, "mend them")
     named, coefficients = _lens(kind, values[: _LEADING[kind]], camera, where)
-    size = [int(n) for n in numbers(camera.get("resolution", []), f"{where}.resolution")]
-    return camera_file(
-        matrix(*values[-4:]), coefficients, (size[0], size[1]) if len(size) == 2 else None,
-        named, where,
-    )  # fmt: skip
+    held = camera.get("resolution")
+    size = pixels(held, f"{where}.resolution") if held else None
+    return camera_file(matrix(*values[-4:]), coefficients, size, named, where)
 
 
 def _lens(kind: str, leading: list[float], camera: Values, where: str) -> tuple[str, list[float]]:

@@ -6,7 +6,7 @@ The names are those of OpenCV's samples, its tutorials in Python, ArUco, and MAT
 from typing import Any
 
 from ...errors import InputError
-from .camera_file import CameraFile, Values, camera_file, numbers, square
+from .camera_file import CameraFile, Values, camera_file, numbers, pixels, square
 from .document import Document
 from .lenses import LENS_NAMES, lens_of, plain
 from .registry import register_format
@@ -98,13 +98,13 @@ def image_size(data: Values, where: str) -> tuple[int, int] | None:
     """
     width, height = find(data, WIDTH), find(data, HEIGHT)
     if width and height:
-        return int(numbers(data[width], where)[0]), int(numbers(data[height], where)[0])
+        return pixels([data[width], data[height]], f"{where}: {width}")
     size, shape = find(data, SIZE), find(data, SHAPE)
     if size or shape:
-        values = numbers(content(data[str(size or shape)]), where)
-        if len(values) < 2:
-            raise InputError("is not width and height", f"{where}: {size or shape}", "give both")
-        first, second = int(values[0]), int(values[1])
+        key = str(size or shape)
+        values = numbers(content(data[key]), f"{where}: {key}")
+        # The shape of a colour image has a third number.
+        first, second = pixels(values[:2] if shape else values, f"{where}: {key}")
         return (first, second) if size else (second, first)
     return None
 

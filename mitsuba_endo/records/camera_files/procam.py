@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from .camera_file import CameraFile, Values, numbers, square
+from .camera_file import CameraFile, Values, numbers, pixels, square
 from .document import Document
 from .matrices import DISTORTION, content, find, image_size, matrix_key, read_matrices
 from .registry import register_format
@@ -21,6 +21,8 @@ _HEIGHT = ("projheight", "projectorheight")
 _R = ("rotation", "roration", "r")
 """kamino's program spells it so."""
 _T = ("translation", "t")
+_ROUNDING = 1e-4
+"""By which a rotation's entries, written in few digits, may exceed one."""
 _FURTHER = (*_MATRIX, *_LENS, *_WIDTH, *_HEIGHT, "projshape", "projectorshape", "roration")
 _OF_DEVICE = (
     "responsegamma", "extrparams", "reprojerrs", "avgreprojerr", "maxreprojerr", "avgepipolarerr",
@@ -48,7 +50,8 @@ def read_flat(document: Document) -> CameraFile:
         data[R] if R and t else None, data[t] if R and t else None, where,
     )  # fmt: skip
     if width and height:
-        projector |= {"width": int(data[width]), "height": int(data[height])}
+        size = pixels([data[width], data[height]], f"{where}: {width}")
+        projector |= {"width": size[0], "height": size[1]}
     return read_matrices(data, where, _FURTHER, projector)
 
 
@@ -83,13 +86,20 @@ def read_devices(document: Document) -> CameraFile:
 
 
 def _relative(camera: Values, projector: Values, where: str) -> tuple[Any, Any]:
-    """Return R and t from the camera to the projector; a device's own are from the reference."""
+    """Return R and t from the camera to the projector; a device's own are from the reference.
+
+    Raises:
+        InputError: a rotation is none.
+    """
     poses = []
     for part in (projector, camera):
         R, t = find(part, ("r",)), find(part, ("t",))
         if not R or not t:
             return None, None
-        poses.append((np.array(square(part[R], where)), np.array(numbers(part[t], where))))
+        rotation = np.array(square(part[R], f"{where}: {R}"))
+        if not np.abs(rotation).max() < 1 + _ROUNDING:
+            raise InputError("is no rotation", f"{where}: {R}", "mend it")
+        poses.append((rotation, np.array(numbers(part[t], f"{where}: {t}", 3))))
     (Rp, tp), (Rc, tc) = poses
     return (Rp @ Rc.T).tolist(), (tp - Rp @ Rc.T @ tc).tolist()
 
@@ -98,9 +108,11 @@ def _projector(matrix: Any, lens: Any, R: Any, t: Any, where: str) -> Values:
     """Return the rig file's keys of a pinhole projector: focal length and pose are starts.
 
     Raises:
-        InputError: more than the five coefficients that projectors have here.
+        InputError: more than the five coefficients that projectors have here, or a skew.
     """
-    (fx, _, cx), (_, fy, cy), _ = square(content(matrix), f"{where}: projector's matrix")
+    (fx, skew, cx), (_, fy, cy), _ = square(content(matrix), f"{where}: projector's matrix")
+    if skew or not fx > 0 or not fy > 0:
+        raise InputError("is no matrix without skew", f"{where}: projector's matrix", "mend it")
     coefficients = numbers(content(lens), f"{where}: projector's distortion")
     while coefficients and not coefficients[-1]:
         coefficients.pop()
@@ -114,5 +126,5 @@ def _projector(matrix: Any, lens: Any, R: Any, t: Any, where: str) -> Values:
     }  # fmt: skip
     if R is not None:
         rotation = square(content(R), f"{where}: rotation")
-        values["pose"] = {"R": rotation, "t": numbers(content(t), f"{where}: translation")}
+        values["pose"] = {"R": rotation, "t": numbers(content(t), f"{where}: translation", 3)}
     return values

@@ -73,7 +73,7 @@ def read(document: Document) -> CameraFile:
         coefficients = numbers(content(data[lens]), f"{where}: {lens}")
     else:
         values = [data.get(spelt.get(plain(name), ""), 0.0) for name in names]
-        coefficients = numbers(values, where)
+        coefficients = numbers(values, f"{where}: {names[0]}", len(names))
     size = image_size(data, where)
-    K = matrix(*numbers([data["fx"], data["fy"], data[cx], data[cy]], where))
+    K = matrix(*numbers([data["fx"], data["fy"], data[cx], data[cy]], f"{where}: {cx}, {cy}", 4))
     return camera_file(K, coefficients, size, named, where)
