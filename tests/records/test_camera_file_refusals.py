@@ -83,6 +83,8 @@ def test_the_rig_adds_the_size_and_nothing_else(tmp_path, camera, message):
     assert message in str(caught.value)
     text = rig.read_text().replace(camera, "{file: c.yaml, width: 240, height: 180}")
     check(load_rig(write(rig, text)).camera, distortion=[])
+    known = text.replace("height: 180}", "height: 180, K_std: [1, 1, 2, 2]}")
+    assert load_rig(write(rig, known)).camera.K_std == [1, 1, 2, 2]
     text = text.replace("{width: 9, height: 9}", "{file: c.yaml, width: 9, height: 9}")
     with pytest.raises(InputError, match="holds no projector"):
         load_rig(write(rig, text))

@@ -182,6 +182,9 @@ def test_colmaps_single_focal_length(tmp_path):
     camera = camera_of(path)
     assert camera.K == [[210, 0, 120], [0, 210, 90], [0, 0, 1]]
     assert camera.distortion == [-0.3]
+    path.write_text(path.read_text() + "8 PINHOLE 240 180 300 301 120.5 90.5\n")
+    assert camera_of(tmp_path / "cameras.txt#8").K[0][0] == 300
+    assert camera_of(tmp_path / "cameras.txt#3") == camera
 
 
 def test_matlab_counts_pixels_from_one(tmp_path):

@@ -7,6 +7,9 @@ from ...errors import InputError
 from .camera_file import Values
 from .registry import read_camera_file
 
+BESIDE = ("width", "height", "K_std", "distortion_std")
+"""Keys of the rig file's camera that may stand beside ``file``: formats do not all hold them."""
+
 
 def named_file(value: Any) -> Values | None:
     """Return the keys beside ``file``, and it, if a part of the rig names a file."""
@@ -20,8 +23,8 @@ def camera_values(
 ) -> tuple[Values, str]:
     """Return the keys of a camera and the file they are from.
 
-    The rig may add the image's size, which not every format holds. ``with_projector`` tells that
-    it names a file for its projector.
+    The rig may add the image's size and deviations, which not every format holds.
+    ``with_projector`` tells that it names a file for its projector.
 
     Raises:
         InputError: the file cannot be read, or contradicts the rig.
@@ -33,14 +36,14 @@ def camera_values(
         takes = f"projector: {{file: {given['file']}}}"
         notes.append(f"{source.name} holds a projector too, which {takes} takes.")
     for key, value in given.items():
-        if key not in ("file", "width", "height"):
+        if key not in ("file", *BESIDE):
             raise InputError("unknown key beside file", f"{path}: camera.{key}", "remove it")
         if key != "file" and file.camera.get(key, value) != value:
             raise InputError(
                 f"is {value}, and {file.camera[key]} in {source.name}", f"{path}: camera.{key}",
                 "give the camera of these images",
             )  # fmt: skip
-    values = file.camera | {key: given[key] for key in ("width", "height") if key in given}
+    values = file.camera | {key: given[key] for key in BESIDE if key in given}
     if "width" not in values or "height" not in values:
         raise InputError(
             "image_width or image_height is missing", str(source),
