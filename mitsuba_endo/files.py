@@ -1,10 +1,8 @@
-"""Writing that is never seen half done: write aside, then rename. What damaged files raise."""
+"""Writing that is never seen half done: write aside, then rename."""
 
 import contextlib
 import errno
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,10 +11,6 @@ from .folder_mark import Kind, read_mark, remove_marked, write_mark
 from .litter import aside_of, remove
 from .outputs import check_folder, check_name
 
-DAMAGED_NPZ = (
-    KeyError, IndexError, ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
-"""What reading an npz file raises that is cut off or holds other arrays than expected."""
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 """Errors that another name does not mend."""
 _TRIES = 20

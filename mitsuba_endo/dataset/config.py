@@ -14,7 +14,8 @@ from pydantic import (
 
 from ..geometry.cameras import CAMERAS
 from ..geometry.laws import LAWS
-from ..records.validation import read_yaml, validate
+from ..reading.trees import read_yaml
+from ..records.validation import validate
 from .capture_ranges import CaptureRanges
 from .ranges import (
     Count,

@@ -12,12 +12,12 @@ from ..errors import InputError
 from ..files import atomic_folder
 from ..folder_mark import Kind
 from ..litter import sweep
+from ..reading.trees import read_json
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import read_exr, save_map, write_exr
 from ..records.known_input import known_rig, save_rig
 from ..records.solution import save_solution
 from ..records.surface import load_surface, save_surface
-from ..records.validation import read_json
 from . import contents
 from .contents import Arrays, Stored, numbered
 from .digests import file_digest

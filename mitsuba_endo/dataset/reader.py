@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from ..errors import InputError
-from ..records.validation import read_json, validate
+from ..reading.trees import read_json
+from ..records.validation import validate
 from .config import Config
 from .contents import Store, Stored
 from .folder_store import FolderStore

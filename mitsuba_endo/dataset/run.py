@@ -14,7 +14,7 @@ from filelock import FileLock, Timeout
 from ..errors import InputError
 from ..files import atomic_path
 from ..litter import sweep
-from ..records.validation import read_json
+from ..reading.trees import read_json
 from .asset_cache import clear_assets
 from .config import Config
 from .contents import Store, numbered

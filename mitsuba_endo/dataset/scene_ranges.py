@@ -93,7 +93,7 @@ class Scene(Section):
     polyps: Polyps | None = None
     """In a colon; none means no polyps."""
     file: str | None = None
-    """Mesh in any format that trimesh reads, or Mitsuba scene (.xml); beside the configuration."""
+    """Mesh (ply, stl, obj, off, glb) or Mitsuba scene (.xml); beside the configuration."""
     unit: Literal["mm", "cm", "m", "um"] = "mm"
     """Of the file's lengths."""
     side: Literal["front", "outside", "inside"] = "front"

@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading.image_header import image_size
+from ..reading.quiet import quiet
+from ..reading.regular import IMAGE, PIXELS, VIDEO, read_bytes, regular
 
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm")
 VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v", ".mpg", ".mpeg")
@@ -73,26 +76,34 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 
 def _image(path: Path) -> Iterator[ImageFrame]:
     raw = read_image(path)
-    yield ImageFrame(path.stem, str(path), (raw / full_scale(raw)).astype(np.float32))
+    scaled = np.divide(raw, full_scale(raw), dtype=np.float32)
+    yield ImageFrame(path.stem, str(path), scaled)
 
 
 def _video(path: Path) -> Iterator[ImageFrame]:
-    if not path.is_file():
-        raise InputError("no such video", str(path), "check the path")
-    video = cv2.VideoCapture(str(path))
+    regular(path, VIDEO, "no such video")
+    with quiet():
+        video = cv2.VideoCapture(str(path))
     try:
         found = 0
+        _check_frames(video, path)
         while True:
-            read, raw = video.read()
+            with quiet():
+                read, raw = video.read()
             if not read:
                 break
             yield ImageFrame(f"{path.stem}_{found:05d}", f"{path} frame {found}",
-                        (np.asarray(raw) / 255).astype(np.float32))  # fmt: skip
+                        np.divide(raw, 255, dtype=np.float32))  # fmt: skip
             found += 1
     finally:
         video.release()
     if not found:
         raise InputError("is not a readable video", str(path), "convert it, e.g. to PNG images")
+
+
+def _check_frames(video: cv2.VideoCapture, path: Path) -> None:
+    width, height = (video.get(p) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    PIXELS.check(int(min(3 * width * height, 2**50)), path)
 
 
 def read_image(path: Path) -> NDArray[np.integer]:
@@ -101,11 +112,17 @@ def read_image(path: Path) -> NDArray[np.integer]:
     Raises:
         InputError: missing, damaged or of another kind.
     """
-    if not path.is_file():
-        raise InputError("no such image", str(path), "check the path")
-    # Decoding from memory: OpenCV's own reader prints to stderr about damaged files.
-    data = np.fromfile(path, np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
+    data = read_bytes(path, IMAGE, "no such image")
+    size = image_size(data)
+    if size is None:
+        raise InputError("is not a readable image", str(path), "make it again")
+    # Of three channels with two bytes at most.
+    PIXELS.check(6 * size[0] * size[1], path)
+    try:
+        with quiet():  # the libraries under OpenCV print what they think of damaged files
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
     if image is None:
         raise InputError("is not a readable image", str(path), "make it again")
     if image.dtype not in (np.uint8, np.uint16):

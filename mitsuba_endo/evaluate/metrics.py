@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Literal
 
 from ..files import atomic_path
-from ..records.validation import Record, read_json, validate
+from ..reading.trees import read_json
+from ..records.validation import Record, validate
 from .shape import Alignment
 
 

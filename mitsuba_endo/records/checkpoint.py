@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import DAMAGED_NPZ, atomic_path
+from ..files import atomic_path
+from ..reading.npz import Arrays, open_npz
+from ..reading.regular import is_file
 
 FILE = "state.npz"
 FORMAT = 2
@@ -78,41 +80,38 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
         InputError: there is none, it is damaged, or another version wrote it.
     """
     path = Path(folder) / FILE
-    if not path.is_file():
+    if not is_file(path):
         raise InputError("no such file", str(path), "name the folder of an earlier calibration")
-    try:
-        # NumPy itself leaves a damaged file open.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            if "format" not in data or int(data["format"]) != FORMAT:
-                raise InputError(
-                    "was written by another version of this program", str(path),
-                    "calibrate anew without --resume",
-                )  # fmt: skip
-            return _read(data)
-    except InputError:
-        raise
-    except DAMAGED_NPZ:
-        raise InputError("is not a readable checkpoint", str(path), "start anew") from None
+    with open_npz(path, "checkpoint", "start anew") as data:
+        if "format" not in data or int(data.get("format", (), "iu")) != FORMAT:
+            raise InputError(
+                "was written by another version of this program", str(path),
+                "calibrate anew without --resume",
+            )  # fmt: skip
+        return _read(data)
 
 
-def _read(data: Mapping[str, NDArray]) -> Checkpoint:
-    names = [str(n) for n in data["names"]]
+def _read(data: Arrays) -> Checkpoint:
+    names = [str(n) for n in data.get("names", (None,), "U")]
+    surfaces = range(len(data.get("kinds", (None,), "U")))
+    blocks = [str(name) for name in data.get("blocks", (None,), "U")]
     return Checkpoint(
-        law=str(data["law"]),
-        last_stage=bool(data["last_stage"]),
+        law=str(data.get("law", (), "U")),
+        last_stage=bool(data.get("last_stage", (), "b")),
         names=names,
-        used=[data[f"used_{k}"] for k in range(len(names))],
-        surfaces=[_surface(data, i) for i in range(len(data["kinds"]))],
-        values={str(name): list(data[f"block_{name}"]) for name in data["blocks"]},
+        used=[data.get(f"used_{k}", (None, None), "b") for k in range(len(names))],
+        surfaces=[_surface(data, i) for i in surfaces],
+        values={name: list(data.get(f"block_{name}")) for name in blocks},
     )
 
 
-def _surface(data: Mapping[str, NDArray], i: int) -> SurfaceRecord:
+def _surface(data: Arrays, i: int) -> SurfaceRecord:
     prefix = f"surface_{i}_"
+    named = [name for name in data.names if name.startswith(prefix)]
     return SurfaceRecord(
-        kind=str(data["kinds"][i]),
-        arrays={key.removeprefix(prefix): data[key] for key in data if key.startswith(prefix)},
-        values=data[f"values_{i}"],
-        weight=float(data["weights"][i]),
-        disparity=float(data["disparities"][i]),
+        kind=str(data.get("kinds", (None,), "U")[i]),
+        arrays={name.removeprefix(prefix): data.get(name, kinds="fiub") for name in named},
+        values=data.get(f"values_{i}", (None,)),
+        weight=float(data.get("weights", (None,))[i]),
+        disparity=float(data.get("disparities", (None,))[i]),
     )

@@ -9,7 +9,11 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import DAMAGED_NPZ, atomic_path
+from ..files import atomic_path
+from ..reading.exr_header import check_exr
+from ..reading.npz import open_npz
+from ..reading.quiet import quiet
+from ..reading.regular import MAP, regular
 
 CHANNELS = ("projector.x", "projector.y")
 WEIGHT = "weight"
@@ -44,8 +48,7 @@ def load_map(path: str | Path) -> CorrespondenceMap:
         InputError: missing file, missing channels, wrong shape, nothing finite, wrong units.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError("no such file", str(path), "check the path")
+    regular(path, MAP)
     check_map_path(path)
     q, weight = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
     known = np.asarray(np.isfinite(q).all(-1))
@@ -104,12 +107,11 @@ def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
     Raises:
         InputError: missing or damaged file.
     """
-    if not Path(path).is_file():
-        raise InputError("no such file", str(path), "check the path")
+    check_exr(path)
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             return {k: np.array(c.pixels, np.float32) for k, c in file.channels().items()}
-    except (RuntimeError, ValueError, TypeError):
+    except (RuntimeError, ValueError, TypeError, MemoryError):
         raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
 
 
@@ -140,25 +142,18 @@ def _read_exr(path: Path) -> _Read:
 
 
 def _read_npz(path: Path) -> _Read:
-    try:
-        with path.open("rb") as file:  # NumPy itself leaves a damaged file open
-            data = np.load(file, allow_pickle=False)
-            if not isinstance(data, np.lib.npyio.NpzFile):
-                raise InputError("is an array, not an npz file", str(path), "use numpy.savez")
-            if "map" not in data:
-                raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
-            q = np.asarray(data["map"])
-            weight = np.asarray(data[WEIGHT], np.float32) if WEIGHT in data else None
-    except InputError:
-        raise
-    except DAMAGED_NPZ:
-        raise InputError("is not a readable npz file", str(path), "make it again") from None
+    with open_npz(path) as arrays:
+        if "map" not in arrays:
+            raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
+        q = arrays.get("map", kinds="fiubcU")
+        weight = arrays.get(WEIGHT).astype(np.float32) if WEIGHT in arrays else None
     if q.ndim != 3 or q.shape[2] != 2 or q.dtype.kind not in "fiu":
         raise InputError(
             f"array 'map' is {q.dtype} {'x'.join(map(str, q.shape))}", str(path),
             "store projector x and y as numbers, HxWx2",
         )  # fmt: skip
-    return q.astype(np.float32), weight
+    with np.errstate(over="ignore"):  # what single precision cannot hold is no coordinate
+        return q.astype(np.float32), weight
 
 
 def _check_weight(weight: NDArray[np.float32], q: NDArray[np.float32], source: str) -> None:

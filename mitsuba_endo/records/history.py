@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..files import DAMAGED_NPZ, atomic_path
+from ..files import atomic_path
 from ..geometry.transforms import RigidTransform
+from ..reading.npz import Arrays, open_npz
+from ..reading.regular import is_file
 from .calibration import Snapshot
 
 FILE = "history.npz"
@@ -85,31 +87,54 @@ def load_history(folder: str | Path) -> list[Snapshot]:
         InputError: it is damaged.
     """
     path = Path(folder) / FILE
-    if not path.is_file():
+    if not is_file(path):
         return []
-    try:
-        # NumPy itself leaves a damaged file open.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            surfaces = range(sum(name.startswith("vertices_0_") for name in data.files))
-            meshes = [
-                [data[f"faces_{m}_{s}"].astype(np.int64) for s in surfaces]
-                for m in range(int(data["mesh"].max(initial=-1)) + 1)
-            ]
-            return [
-                Snapshot(
-                    iteration=int(data["iteration"][i]),
-                    cost=_or_none(data["cost"][i]),
-                    scale_px=_or_none(data["scale_px"][i]),
-                    focal=data["focal"][i].tolist(),
-                    surfaces=[data[f"vertices_{i}_{s}"].astype(np.float64) for s in surfaces],
-                    faces=meshes[int(mesh)],
-                    world_from_camera=_poses(data["world_from_camera"][i]),
-                    projector_from_camera=_poses(data["projector_from_camera"][i]),
-                )
-                for i, mesh in enumerate(data["mesh"])
-            ]
-    except DAMAGED_NPZ:
-        raise InputError("is not a readable history", str(path), "delete it") from None
+    with open_npz(path, "history", "delete it") as data:
+        return _snapshots(data)
+
+
+def _snapshots(data: Arrays) -> list[Snapshot]:
+    mesh = data.get("mesh", (None,), "iu")
+    count = len(mesh)
+    surfaces = range(sum(name.startswith("vertices_0_") for name in data.names))
+    frames = data.get("focal", (count, None)).shape[1]
+    focal = data.get("focal")
+    meshes = [
+        [data.get(f"faces_{m}_{s}", (None, 3), "iu").astype(np.int64) for s in surfaces]
+        for m in range(int(mesh.max(initial=-1)) + 1)
+    ]
+    numbers = {name: data.get(name, (count,)) for name in ("iteration", "cost", "scale_px")}
+    poses = {
+        name: data.get(name, (count, frames, 4, 4))
+        for name in ("world_from_camera", "projector_from_camera")
+    }
+    snapshots = [
+        Snapshot(
+            iteration=int(numbers["iteration"][i]),
+            cost=_or_none(numbers["cost"][i]),
+            scale_px=_or_none(numbers["scale_px"][i]),
+            focal=focal[i].tolist(),
+            surfaces=[
+                data.get(f"vertices_{i}_{s}", (None, 3)).astype(np.float64) for s in surfaces
+            ],
+            faces=meshes[int(m)],
+            **{name: _poses(of_frames[i]) for name, of_frames in poses.items()},
+        )
+        for i, m in enumerate(mesh)
+    ]
+    for snapshot in snapshots:
+        _check(snapshot, data.source)
+    return snapshots
+
+
+def _check(snapshot: Snapshot, source: str) -> None:
+    for vertices, faces in zip(snapshot.surfaces, snapshot.faces, strict=True):
+        if faces.size and not (faces.min() >= 0 and faces.max() < len(vertices)):
+            raise InputError("has triangles without vertices", source, "delete it")
+    poses = (*snapshot.world_from_camera, *snapshot.projector_from_camera)
+    numbers = [snapshot.focal, *(p.R for p in poses), *(p.t for p in poses)]
+    if not all(np.isfinite(n).all() for n in numbers) or not snapshot.surfaces:
+        raise InputError("is not a readable history", source, "delete it")
 
 
 def _or_none(value: float) -> float | None:

@@ -5,23 +5,26 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.laws import LAWS, ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
+from ..reading.trees import read_yaml
 from .camera_files.in_rig import camera_values, named_file, projector_values
-from .validation import Record, read_yaml, validate
+from .validation import LARGEST, Length, Real, Record, Size, validate
 
 Matrix3 = Annotated[
-    list[Annotated[list[float], Field(min_length=3, max_length=3)]],
+    list[Annotated[list[Real], Field(min_length=3, max_length=3)]],
     Field(min_length=3, max_length=3),
 ]
-Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
-Vector2 = Annotated[list[float], Field(min_length=2, max_length=2)]
+Vector3 = Annotated[list[Real], Field(min_length=3, max_length=3)]
+Vector2 = Annotated[list[Real], Field(min_length=2, max_length=2)]
 Sharing = Literal["fixed", "shared", "per_frame"]
 AUTO_LAW = "auto"
 MAX_PROJECTOR_DISTORTION = 5
+LEAST_FOCAL = 1e-3
+"""Pixels; with less, the whole of space lies within one."""
 
 
 class Camera(Record):
@@ -30,13 +33,13 @@ class Camera(Record):
     model: str = "opencv"
     """``opencv`` (pinhole + Brown), ``opencv_fisheye``, ``omni``, ``double_sphere`` or
     ``scaramuzza``; ``kannala_brandt`` is another name of ``opencv_fisheye``."""
-    width: PositiveInt
+    width: Size
     """Pixels."""
-    height: PositiveInt
+    height: Size
     """Pixels."""
     K: Matrix3
     """Camera matrix, pixels, integer pixel = pixel centre."""
-    distortion: list[float] = []
+    distortion: list[Real] = []
     """Coefficients in the model's order: k1, k2, p1, p2, k3[, k4, k5, k6]; fisheye k1..k4; omni
     xi, k1, k2, p1, p2, k3; double_sphere xi, alpha; scaramuzza b1..b4, d, e."""
     K_std: Annotated[list[PositiveFloat], Field(min_length=4, max_length=4)] | None = None
@@ -55,7 +58,7 @@ class Camera(Record):
     @field_validator("K")
     @classmethod
     def _camera_matrix(cls, value: list[list[float]]) -> list[list[float]]:
-        if not (value[0][0] > 0 and value[1][1] > 0):
+        if not (value[0][0] >= LEAST_FOCAL and value[1][1] >= LEAST_FOCAL):
             raise ValueError(
                 "the focal lengths on the diagonal are not positive; give fx and fy in pixels"
             )
@@ -99,7 +102,7 @@ class Camera(Record):
 class Focal(Record):
     """Focal length of the projector, pattern pixels; written as a number it is known and fixed."""
 
-    value: PositiveFloat | None = None
+    value: Length | None = None
     """Known value or starting guess; not needed when it is to be found."""
     refine: bool = True
     """Whether it is an unknown."""
@@ -147,18 +150,18 @@ class Projector(Record):
 
     law: str = "direction_cosine"
     """``pinhole``, ``direction_cosine``, or ``auto`` to fit both and compare."""
-    width: PositiveInt
+    width: Size
     """Pattern pixels."""
-    height: PositiveInt
+    height: Size
     """Pattern pixels."""
     focal: Focal = Focal()
     centre: Vector2 | None = None
     """Principal point, pattern pixels; default: the middle of the pattern."""
-    aspect: PositiveFloat = 1.0
+    aspect: Annotated[float, Field(ge=0.01, le=100)] = 1.0
     """fy / fx."""
-    distortion: Annotated[list[float], Field(max_length=MAX_PROJECTOR_DISTORTION)] = []
+    distortion: Annotated[list[Real], Field(max_length=MAX_PROJECTOR_DISTORTION)] = []
     """k1, k2, p1, p2, k3 on the law's normalised coordinates, shorter lists allowed."""
-    grid_period: PositiveFloat | None = None
+    grid_period: Length | None = None
     """Period of the pattern's grid, pattern pixels: lets slips of the decoder by whole periods be
     told from other errors."""
     pose: Pose | None = None
@@ -200,8 +203,8 @@ class KnownDistance(Record):
 
     pixels: Annotated[list[Vector2], Field(min_length=2, max_length=2)]
     """The two points, camera pixels."""
-    mm: PositiveFloat
-    std: float = Field(default=0.0, ge=0)
+    mm: Length
+    std: float = Field(default=0.0, ge=0, le=LARGEST)
     """Standard deviation of ``mm``."""
     frame: int = Field(default=0, ge=0)
     """Index of the frame."""
@@ -210,9 +213,9 @@ class KnownDistance(Record):
 class Scale(Record):
     """Where the unit of length comes from: correspondences alone never fix it."""
 
-    baseline: PositiveFloat | None = None
+    baseline: Length | None = None
     """|t| of the first frame's projector_from_camera, mm."""
-    baseline_std: float = Field(default=0.0, ge=0)
+    baseline_std: float = Field(default=0.0, ge=0, le=LARGEST)
     """Standard deviation of ``baseline``, mm."""
     known_distance: KnownDistance | None = None
 
@@ -272,13 +275,13 @@ class Share(Record):
 class Drift(Record):
     """Random walk of the projector in its channel from frame to frame (spread per step)."""
 
-    insertion_mm: PositiveFloat | None = None
+    insertion_mm: Length | None = None
     """Standard deviation of the step along the projector's axis, mm."""
-    roll_deg: PositiveFloat | None = None
+    roll_deg: Length | None = None
     """Standard deviation of the step about the projector's axis, degrees."""
-    lateral_mm: PositiveFloat | None = None
+    lateral_mm: Length | None = None
     """Standard deviation of the step across the axis, mm."""
-    tilt_deg: PositiveFloat | None = None
+    tilt_deg: Length | None = None
     """Standard deviation of the step of the axis' direction, degrees."""
 
 

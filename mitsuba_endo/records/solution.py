@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
@@ -10,9 +10,15 @@ from pydantic import ConfigDict, Field
 from ..files import atomic_path
 from ..geometry.laws import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
-from .rig import Camera, Matrix3, Vector3
-from .validation import Record, read_json, validate
+from ..reading.trees import read_json
+from .rig import Camera
+from .validation import Record, validate
 
+Matrix3 = Annotated[
+    list[Annotated[list[float], Field(min_length=3, max_length=3)]],
+    Field(min_length=3, max_length=3),
+]
+Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
 SCHEMA = 1
@@ -205,4 +211,6 @@ def load_solution(path: str | Path) -> Solution:
         name, other = "solution.json", "truth.json"
         only_other = (path / other).exists() and not (path / name).exists()
         path = path / (other if only_other else name)
-    return validate(Solution, read_json(path), str(path))
+    from .solution_checks import check_solution  # it knows this module
+
+    return check_solution(validate(Solution, read_json(path), str(path)), str(path))

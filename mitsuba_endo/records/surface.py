@@ -8,7 +8,10 @@ import numpy as np
 import trimesh
 
 from ..errors import InputError
-from ..files import DAMAGED_NPZ, atomic_path
+from ..files import atomic_path
+from ..reading.mesh_files import read_mesh
+from ..reading.npz import open_npz
+from ..reading.regular import is_file
 from .calibration import SurfaceEstimate
 
 # Mitsuba asks for a postfix: it then offers the values as the mesh attribute `vertex_std`.
@@ -55,37 +58,27 @@ def load_with_modes(path: str | Path) -> SurfaceEstimate:
     path = Path(path)
     surface = load_surface(path)
     beside = path.with_name(MODES)
-    if not beside.is_file():
+    if not is_file(beside):
         return surface
-    try:
-        # NumPy itself leaves a damaged file open.
-        with beside.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            modes = data[path.name].astype(np.float64) if path.name in data else None
-    except DAMAGED_NPZ:
-        raise InputError("is not a readable npz file", str(beside), "calibrate again") from None
+    with open_npz(beside, todo="calibrate again") as data:
+        modes = data.get(path.name, (None, None)) if path.name in data else None
     if modes is not None and len(modes) != len(surface.vertices):
         raise InputError(f"is not that of {path.name}", str(beside), "calibrate again")
-    return replace(surface, modes=modes)
+    return replace(surface, modes=None if modes is None else modes.astype(np.float64))
 
 
 def load_surface(path: str | Path) -> SurfaceEstimate:
-    """Read a triangle mesh in any format that trimesh reads; nothing is merged or reordered.
+    """Read a triangle mesh (ply, stl, obj, off, glb); nothing is merged or reordered.
 
     Raises:
-        InputError: missing file, another format, or no triangles with finite vertices.
+        InputError: missing file, another format, damage, or no triangles with finite vertices.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("no such file", str(path), "check the path")
-    try:
-        mesh: Any = trimesh.load_mesh(path, process=False)
-    except Exception:  # trimesh's readers raise whatever the damaged file leads them to
-        raise InputError("is not a readable mesh", str(path), "make it again") from None
-    faces = np.asarray(getattr(mesh, "faces", []), np.int64)
-    if not len(faces) or not np.isfinite(mesh.vertices[faces]).all():
-        raise InputError("holds no triangles with finite vertices", str(path), "make it again")
+    mesh = read_mesh(path)
+    vertices, faces = np.array(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     raw = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")
     std = raw[STD_PROPERTY] if raw is not None and STD_PROPERTY in (raw.dtype.names or ()) else None
-    return SurfaceEstimate(
-        np.array(mesh.vertices, np.float64), faces, None if std is None else std.astype(np.float64)
-    )
+    if std is None:
+        return SurfaceEstimate(vertices, faces)
+    if std.shape != (len(vertices),) or std.dtype.kind not in "fiu":
+        raise InputError(f"{STD_PROPERTY} is no number a vertex", str(path), "make it again")
+    return SurfaceEstimate(vertices, faces, std.astype(np.float64))

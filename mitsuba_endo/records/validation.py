@@ -1,14 +1,11 @@
-"""Reading YAML and JSON against a schema, with errors that name the file and the field."""
+"""Schemas of YAML and JSON files, with errors that name the file and the field."""
 
 import difflib
-import json
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..errors import InputError
+from ..errors import InputError, shown
 
 
 class Record(BaseModel):
@@ -19,49 +16,12 @@ class Record(BaseModel):
 
 R = TypeVar("R", bound=BaseModel)
 
-
-def read_text(path: str | Path) -> str:
-    """Read a text file.
-
-    Raises:
-        InputError: it does not exist or is not text.
-    """
-    path = Path(path)
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError("no such file", str(path), "check the path") from None
-    except UnicodeDecodeError:
-        raise InputError("is not a text file", str(path), "check the path") from None
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise InputError(f"cannot be read ({reason})", str(path), "check the path") from None
-
-
-def read_yaml(path: str | Path) -> dict[str, Any]:
-    """Read a YAML mapping."""
-    try:
-        data = yaml.safe_load(read_text(path))
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" in line {mark.line + 1}" if mark else ""
-        raise InputError(f"is not valid YAML{line}", str(path), "mend its syntax") from None
-    if not isinstance(data, dict):
-        raise InputError("holds no mapping of keys to values", str(path), "see the rig file docs")
-    return data
-
-
-def read_json(path: str | Path) -> dict[str, Any]:
-    """Read a JSON object."""
-    try:
-        data = json.loads(read_text(path))
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"is not valid JSON (line {error.lineno})", str(path), "mend or remake it"
-        ) from None
-    if not isinstance(data, dict):
-        raise InputError("holds no JSON object", str(path), "give a solution or truth file")
-    return data
+LARGEST = 1e9
+"""Of a length, mm, or a number of pixels that is believed: squares and products are finite."""
+Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Length = Annotated[float, Field(gt=0, le=LARGEST)]
+Size = Annotated[int, Field(gt=0, le=65_536)]
+"""Width or height of an image or pattern, pixels."""
 
 
 def validate(model: type[R], data: dict[str, Any], source: str) -> R:
@@ -107,9 +67,9 @@ def _explain(
         return what, field, todo or "mend the value"
     if kind == "model_type":
         keys = ", ".join(_keys_at(model, path))
-        return f"is not a mapping, got {given!r}", field, f"the keys are {keys}"
+        return f"is not a mapping, got {shown(given)}", field, f"the keys are {keys}"
     message = error["msg"][0].lower() + error["msg"][1:]
-    return f"{message}, got {given!r}", field, "mend the value"
+    return f"{message}, got {shown(given)}", field, "mend the value"
 
 
 def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:

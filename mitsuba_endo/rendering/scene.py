@@ -2,7 +2,6 @@
 
 import re
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -16,6 +15,8 @@ from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
+from ..reading.regular import is_file
+from ..reading.xml_guard import read_xml
 from ..shapes import Mesh
 from . import keys
 from .axes import pose_from_to_world
@@ -173,7 +174,7 @@ def find_scene(source: str | Path) -> Path:
         InputError: there is neither.
     """
     path = Path(source)
-    if path.is_file():
+    if is_file(path):
         return path
     name = str(source).removesuffix(".xml")
     if name in packaged_scenes():
@@ -185,10 +186,7 @@ def find_scene(source: str | Path) -> Path:
 
 def _declared(path: Path) -> dict[str, str]:
     """Return the parameters that the scene declares, with their defaults."""
-    try:
-        root = ET.parse(path).getroot()
-    except (ET.ParseError, UnicodeDecodeError) as error:
-        raise InputError(f"is not valid XML ({error})", str(path), "correct it") from None
+    root = read_xml(path)
     if root.tag != "scene":
         raise InputError(f"starts with <{root.tag}>", str(path), "give a Mitsuba scene file")
     return {d.attrib["name"]: d.attrib["value"] for d in root.iter("default")

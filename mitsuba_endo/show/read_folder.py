@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading.regular import TABLE, is_file, read_text
 from ..records.calibration import Calibration, FrameMaps, SurfaceEstimate, TraceRow
 from ..records.correspondence import CHANNELS, read_exr, write_exr
 from ..records.history import load_history
@@ -36,7 +37,7 @@ class StoredFrames(Sequence[FrameMaps]):
         ]
         self._read: dict[int, FrameMaps] = {}
         for path in (path for _, *paths in self._files for path in paths):
-            if not path.is_file():
+            if not is_file(path):
                 raise InputError("no such file", str(path), "calibrate again")
 
     def __len__(self) -> int:
@@ -84,7 +85,7 @@ def read_solution_folder(path: str | Path) -> Calibration:
 def _own_surfaces(folder: Path, frames: int) -> dict[int, SurfaceEstimate]:
     """Return the surfaces of frames after the first, where frames do not share one."""
     paths = {k: folder / own_surface_name(k) for k in range(1, frames)}
-    return {k: load_with_modes(path) for k, path in paths.items() if path.is_file()}
+    return {k: load_with_modes(path) for k, path in paths.items() if is_file(path)}
 
 
 def read_observed(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -112,17 +113,15 @@ def _stacked(channels: dict[str, NDArray[np.float32]], path: Path) -> NDArray[np
 
 
 def _trace(path: Path) -> list[TraceRow]:
+    text = read_text(path, TABLE, "calibrate again")
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return [
-                TraceRow(
-                    int(row["iteration"]), float(row["seconds"]), float(row["cost"]),
-                    float(row["focal"]) if row["focal"] else None, float(row["damping"]),
-                    float(row["scale_px"]), float(row["step"]),
-                )
-                for row in csv.DictReader(file)
-            ]  # fmt: skip
-    except OSError:
-        raise InputError("no such file", str(path), "calibrate again") from None
-    except (KeyError, ValueError, TypeError):
+        return [
+            TraceRow(
+                int(row["iteration"]), float(row["seconds"]), float(row["cost"]),
+                float(row["focal"]) if row["focal"] else None, float(row["damping"]),
+                float(row["scale_px"]), float(row["step"]),
+            )
+            for row in csv.DictReader(text.splitlines())
+        ]  # fmt: skip
+    except (KeyError, ValueError, TypeError, csv.Error):
         raise InputError("is not a table of iterations", str(path), "calibrate again") from None

@@ -1,15 +1,12 @@
 """A camera file as keys and values, whatever syntax it is written in."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
-import yaml
-
-from ...errors import InputError
-from ..validation import read_text
+from ...reading.file_storage import matrix, number, read_file_storage
+from ...reading.regular import YAML, read_text
+from ...reading.trees import any_mapping
 
 
 @dataclass(frozen=True)
@@ -32,48 +29,29 @@ def read_document(path: Path, part: str = "") -> Document:
     """Read an OpenCV FileStorage (YAML, XML, JSON), plain YAML or JSON, or text.
 
     Raises:
-        InputError: there is no such file, it is no text, or its syntax is broken.
+        InputError: there is no such file, it is too large or too deep, no text, or its syntax is
+            broken.
     """
-    if not path.is_file():
-        raise InputError("no such file", str(path), "check `camera` in the rig file")
-    text = read_text(path)
+    text = read_text(path, YAML, "check `camera` in the rig file")
     return Document(path, text, _parse(path, text), part)
 
 
 def _parse(path: Path, text: str) -> dict[str, Any]:
     if text.startswith("%YAML:1.0") or "<opencv_storage>" in text or "opencv-matrix" in text:
-        return _from_storage(path)
-    try:
-        if text.lstrip().startswith("{"):
-            data = json.loads(text)
-        else:  # a printed message ends with the mark of a next document
-            data = next(iter(yaml.safe_load_all(text)), None)
-    except (json.JSONDecodeError, yaml.YAMLError):
-        return {}
-    return data if isinstance(data, dict) else {}
+        nodes = read_file_storage(path)
+        return {name: _value(node, str(path)) for name, node in nodes.items()}
+    return any_mapping(text, str(path))
 
 
-def _from_storage(path: Path) -> dict[str, Any]:
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        root = storage.root()
-        return {name: _value(root.getNode(name)) for name in root.keys()}  # noqa: SIM118
-    except (cv2.error, SystemError):
-        raise InputError("is not an OpenCV FileStorage", str(path), "check the file") from None
-
-
-def _value(node: cv2.FileNode) -> Any:
-    if node.isInt():
-        return int(node.real())
-    if node.isReal():
-        return float(node.real())
-    if node.isString():
-        return node.string()
-    if node.isSeq():
-        return [_value(node.at(i)) for i in range(node.size())]
-    if not node.isMap():
-        return None
-    names = node.keys()
-    if {"rows", "cols", "dt"} <= set(names) or {"sizes", "dt"} <= set(names):
-        return node.mat().tolist()
-    return {name: _value(node.getNode(name)) for name in names}
+def _value(node: Any, source: str) -> Any:
+    """Return matrices as lists of rows, and numbers that XML has as text as numbers."""
+    if isinstance(node, list):
+        return [_value(item, source) for item in node]
+    if isinstance(node, dict):
+        if {"rows", "cols", "dt"} <= node.keys():
+            return matrix(node, source).tolist()
+        return {name: _value(item, source) for name, item in node.items()}
+    value = number(node)
+    if value is None or isinstance(node, bool):
+        return node
+    return int(value) if value.is_integer() and "." not in str(node) else value

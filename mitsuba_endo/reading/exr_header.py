@@ -1,0 +1,117 @@
+"""The header of an OpenEXR file, looked at before anything is allocated for its pixels.
+
+Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html.
+"""
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from .regular import MAP, regular
+
+_MAGIC = 20000630
+_LONGEST = 1 << 20
+"""Bytes of header that are looked at; cameras write a few thousand."""
+_TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
+_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
+"""Lines of a chunk by the number of the compression."""
+_RATIO = (1, 128, 1032, 1032)
+"""How much none, run lengths and deflate (of one line, of 16) shrink at most; others at will."""
+_CHUNK = 16
+"""Bytes that a chunk takes at least: its offset in the table, its line and its length."""
+_SLACK = 64
+
+
+@dataclass(frozen=True)
+class Header:
+    """What the header says of the pixels."""
+
+    width: int
+    height: int
+    channels: int
+    sample_bytes: int
+    """Bytes of one pixel, all channels."""
+    compression: int
+    tiled: bool
+    subsampled: bool
+
+
+def check_exr(path: str | Path) -> Header:
+    """Refuse a file whose header promises more than the file can hold, or memory should.
+
+    Raises:
+        InputError: missing, no OpenEXR file, deep, of several parts, or too large.
+    """
+    size = regular(path, MAP)
+    try:
+        with Path(path).open("rb") as file:
+            header = _parse(file.read(min(size, _LONGEST)))
+    except (struct.error, ValueError, IndexError, OSError):
+        raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
+    MAP.check(4 * header.width * header.height * header.channels, path)
+    if header.subsampled:
+        raise InputError("has channels of fewer pixels", str(path), "store all at full size")
+    if not _holds(header, size):
+        raise InputError("is cut short", str(path), "make it again")
+    return header
+
+
+def _holds(header: Header, size: int) -> bool:
+    raw = header.width * header.height * header.sample_bytes
+    if header.compression < len(_RATIO) and raw > _RATIO[header.compression] * (size + _SLACK):
+        return False
+    chunks = -(-header.height // _LINES[header.compression])
+    return header.tiled or chunks * _CHUNK <= size
+
+
+def _parse(data: bytes) -> Header:
+    magic, version = struct.unpack_from("<ii", data, 0)
+    if magic != _MAGIC or version & (_DEEP | _PARTS):
+        raise ValueError("no picture of one part")
+    found = dict(_attributes(data))
+    left, top, right, bottom = struct.unpack("<4i", found["dataWindow"])
+    width, height = right - left + 1, bottom - top + 1
+    if width < 1 or height < 1:
+        raise ValueError("no pixels")
+    compression = found["compression"][0]
+    if compression >= len(_LINES):
+        raise ValueError("unknown compression")
+    bytes_, samplings = _channels(found["channels"])
+    subsampled = any(s != (1, 1) for s in samplings)
+    tiled = bool(version & _TILED)
+    return Header(width, height, len(bytes_), sum(bytes_), compression, tiled, subsampled)
+
+
+def _attributes(data: bytes) -> list[tuple[str, bytes]]:
+    at, found = 8, []
+    while data[at]:
+        name, at = _text(data, at)
+        _, at = _text(data, at)
+        (length,) = struct.unpack_from("<i", data, at)
+        if length < 0 or at + 4 + length > len(data):
+            raise ValueError("cut short")
+        found.append((name, data[at + 4 : at + 4 + length]))
+        at += 4 + length
+    needed = {"dataWindow", "compression", "channels"}
+    if not needed <= {name for name, _ in found}:
+        raise ValueError("an attribute is missing")
+    return found
+
+
+def _channels(data: bytes) -> tuple[list[int], list[tuple[int, int]]]:
+    at, sizes, samplings = 0, [], []
+    while data[at]:
+        _, at = _text(data, at)
+        kind, _, across, down = struct.unpack_from("<4i", data, at)
+        sizes.append({0: 4, 1: 2, 2: 4}.get(kind, 4))
+        samplings.append((across, down))
+        at += 16
+    if not sizes:
+        raise ValueError("no channels")
+    return sizes, samplings
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    end = data.index(b"\0", at, at + 256)
+    return data[at:end].decode("latin-1"), end + 1
