@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..decode.image_files import read_image
 from ..errors import InputError
 from ..files import atomic_folder
 from ..folder_mark import Kind
@@ -21,6 +22,7 @@ from ..records.surface import load_surface, save_surface
 from . import contents
 from .contents import Arrays, Stored, numbered
 from .digests import file_digest
+from .intact import TODO, check_files, checked_description
 from .sample import MAP, Sample
 
 SAMPLES = "samples"
@@ -87,15 +89,18 @@ class FolderStore:
             InputError: a file of it is missing or damaged.
         """
         folder = self._path(index)
-        description = read_json(folder / DESCRIPTION)
+        description = self._described(folder)
+        check_files(folder, description["sha256"])
         arrays: Arrays = {contents.IMAGE: _read_image(folder / "image.png")}
         for name, (array, channels) in CHANNELS.items():
             if (folder / name).exists():
-                arrays[array] = _joined(read_exr(folder / name), channels)
+                arrays[array] = _joined(read_exr(folder / name), channels, str(folder))
         grid = read_exr(folder / GRID)
-        arrays |= {array: _joined(grid, names) for array, names in GRID_CHANNELS.items()}
+        arrays |= {
+            array: _joined(grid, names, str(folder)) for array, names in GRID_CHANNELS.items()
+        }
         masks = read_exr(folder / MASKS)
-        arrays |= {name: masks[name] > 0 for name in contents.MASKS}
+        arrays |= {n: _joined(masks, (n,), str(folder)) > 0 for n in contents.MASKS}
         for name, kind in TYPES.items():
             if name in arrays:
                 arrays[name] = arrays[name].astype(kind)
@@ -117,13 +122,17 @@ class FolderStore:
         listed = []
         for index in sorted(self.indices()):
             path = self._path(index)
-            described = read_json(path / DESCRIPTION)
+            described = self._described(path)
             sums = {**described["sha256"], DESCRIPTION: file_digest(path / DESCRIPTION)}
             folder = f"{SAMPLES}/{path.name}"
             listed.append(
                 {"index": index, "kind": described["kind"], "path": folder, "sha256": sums}
             )
         return listed
+
+    def _described(self, folder: Path) -> dict[str, Any]:
+        path = folder / DESCRIPTION
+        return checked_description(read_json(path, TODO), str(path))
 
     def _path(self, index: int) -> Path:
         return self._folder / f"{index:06d}"
@@ -134,7 +143,12 @@ def _split(array: NDArray[Any], channels: tuple[str, ...]) -> dict[str, NDArray[
     return {name: stacked[..., i] for i, name in enumerate(channels)}
 
 
-def _joined(channels: dict[str, NDArray[np.float32]], names: tuple[str, ...]) -> NDArray[Any]:
+def _joined(
+    channels: dict[str, NDArray[np.float32]], names: tuple[str, ...], source: str
+) -> NDArray[Any]:
+    missing = [name for name in names if name not in channels]
+    if missing:
+        raise InputError(f"channel {missing[0]} is missing", source, TODO)
     stacked = np.stack([channels[name] for name in names], -1)
     return stacked[..., 0] if len(names) == 1 else stacked
 
@@ -145,7 +159,5 @@ def _write_image(path: Path, image: NDArray[Any]) -> None:
 
 
 def _read_image(path: Path) -> NDArray[Any]:
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise InputError("is not a readable image", str(path), "make the sample again")
-    return np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image
+    image = read_image(path)
+    return image[..., 0] if image.shape[2] == 1 else np.ascontiguousarray(image[..., ::-1])

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ..errors import InputError
+from ..reading.regular import is_file
 from ..reading.trees import read_json
 from ..records.validation import validate
 from .config import Config
@@ -21,11 +22,14 @@ class Dataset:
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
-        if not (self.folder / DATASET).is_file():
+        if not is_file(self.folder / DATASET):
             raise InputError(
                 f"holds no {DATASET}", str(folder), "give a folder that `mitsuba-endo dataset` made"
             )
-        record = read_json(self.folder / DATASET)
+        record = read_json(self.folder / DATASET, "make the dataset again")
+        if not isinstance(record.get("config"), dict):
+            where = str(self.folder / DATASET)
+            raise InputError("holds no configuration", where, "make the dataset again")
         self.config = validate(Config, record["config"], DATASET)
         store: Store = FolderStore(self.folder)
         if self.config.format == "hdf5":

@@ -179,7 +179,14 @@ def _failure(out: str | Path, index: int) -> Path:
 def failures(out: str | Path) -> list[dict[str, Any]]:
     """Return the records of failed samples."""
     indices = sorted(numbered(Path(out) / FAILED, ".json"))
-    return [read_json(_failure(out, index)) for index in indices]
+    return [_failed(_failure(out, index)) for index in indices]
+
+
+def _failed(path: Path) -> dict[str, Any]:
+    record = read_json(path, "remove it")
+    if not isinstance(record.get("index"), int) or not isinstance(record.get("reason"), str):
+        raise InputError("is no record of a failed sample", str(path), "remove it")
+    return record
 
 
 def _open_folder(out: Path) -> dict[str, Any] | None:

@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import atomic_path
 from ..litter import sweep
+from ..reading.regular import SHARD, regular
+from ..reading.trees import parse_json
 from . import contents
 from .contents import Stored, numbered
 from .digests import array_digest, file_digest, text_digest
+from .hdf5_guard import BROKEN, texts_and_arrays
+from .intact import TODO, check_arrays, checked_description
 from .sample import Sample
 
 STAGING = "staging"
@@ -74,16 +78,19 @@ class ShardStore:
         """
         staged = self._staged(index)
         path = staged if staged.exists() else self._shard(index // self._per_shard)
+        regular(path, SHARD, f"has no sample {index}", TODO)
         try:
             with hdf5().File(path, "r") as file:
-                group = file[_name(index)]
-                texts = (DESCRIPTION, TRUTH)
-                arrays = {name: group[name][()] for name in group if name not in texts}
-                return Stored(json.loads(group[DESCRIPTION].asstr()[()]), arrays)
-        except (OSError, KeyError):
-            raise InputError(
-                f"has no readable sample {index}", str(path), "make it again"
-            ) from None
+                texts, arrays = texts_and_arrays(file[_name(index)], (DESCRIPTION, TRUTH))
+        except BROKEN:
+            raise InputError(f"has no readable sample {index}", str(path), TODO) from None
+        where = f"{path}: {_name(index)}"
+        described = checked_description(parse_json(texts[DESCRIPTION], where, TODO), where)
+        sums = dict(described["sha256"])
+        if sums.pop(TRUTH, None) != text_digest(texts[TRUTH]):
+            raise InputError("truth is missing or damaged", where, TODO)
+        check_arrays(arrays, sums, where)
+        return Stored(described, arrays)
 
     def settle(self, settled: set[int], last: bool) -> None:
         """Seal the shards of which all samples are settled, or all if none follows."""
@@ -138,10 +145,11 @@ class ShardStore:
         path = self._shard(number)
         if not path.exists():
             return set()
+        regular(path, SHARD)
         try:
             with hdf5().File(path, "r") as file:
-                return {int(name) for name in file}
-        except OSError:
+                return {int(name) for name in file if name.isascii() and name.isdigit()}
+        except BROKEN:
             raise InputError(
                 "is damaged", str(path), "remove it: its samples are made again"
             ) from None

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import as_file, files
@@ -16,6 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading.regular import NETWORK, read_bytes
+from ..reading.trees import read_json
+from .apart import ApartNetwork
 from .normalise import normalise
 
 CHANNELS = (
@@ -94,8 +97,15 @@ class Network:
         """
         self.engine: Engine = engine or default_engine()
         self._channels = channels
-        load = {"onnxruntime": _onnxruntime, "opencv": _opencv}[self.engine]
-        self._run = load(weights, source)
+        if self.engine == "onnxruntime" and not find_spec("onnxruntime"):
+            raise InputError(
+                "ONNX Runtime is not installed", source, 'pip install "mitsuba-endo[decode]"'
+            )
+        known = _checksum(weights) == _checksum(_shipped())
+        # Foreign weights can end the process that runs them.
+        self._run: _Runner = (
+            loader(self.engine)(weights) if known else ApartNetwork(weights, source, self.engine)
+        )
 
     def heads(self, image: NDArray[np.integer] | NDArray[np.floating]) -> Heads:
         """Return what the network says of an image (H, W) or (H, W, 3); see :func:`normalise`.
@@ -133,9 +143,7 @@ def load_network(path: str | Path | None = None, engine: Engine | None = None) -
         with as_file(files("mitsuba_endo.decode") / "weights") as folder:
             return load_network(folder / "decoder.onnx", engine)
     path = Path(path)
-    if not path.is_file():
-        raise InputError("no such file", str(path), "give the decoder's ONNX file")
-    weights = path.read_bytes()
+    weights = read_bytes(path, NETWORK, todo="give the decoder's ONNX file")
     return Network(weights, _channels(weights, path), str(path), engine)
 
 
@@ -152,9 +160,9 @@ def _checksum(weights: bytes) -> str:
 def _channels(weights: bytes, path: Path) -> list[str]:
     beside = path.with_suffix(".json")
     try:
-        description = json.loads(beside.read_text("utf-8"))
+        description = read_json(beside)
         channels, checksum = [str(name) for name in description["channels"]], description["sha256"]
-    except (OSError, ValueError, KeyError, TypeError):
+    except (InputError, KeyError, TypeError):
         raise InputError(
             f"is not a decoder network: {beside.name} beside it is missing or describes none",
             str(path), "give the file that scripts/train_decoder.py wrote, with its JSON",
@@ -169,30 +177,29 @@ def default_engine() -> Engine:
     return "onnxruntime" if find_spec("onnxruntime") else "opencv"
 
 
-def _onnxruntime(weights: bytes, source: str) -> _Runner:
-    if not find_spec("onnxruntime"):
-        raise InputError(
-            "ONNX Runtime is not installed", source, 'pip install "mitsuba-endo[decode]"'
-        )
+def loader(engine: str) -> Callable[[bytes], _Runner]:
+    """Return the function that loads weights into an engine; it raises whatever that raises."""
+    return {"onnxruntime": _onnxruntime, "opencv": _opencv}[engine]
+
+
+def _shipped() -> bytes:
+    return (files("mitsuba_endo.decode") / "weights" / "decoder.onnx").read_bytes()
+
+
+def _onnxruntime(weights: bytes) -> _Runner:
     ort: Any = import_module("onnxruntime")
     options = ort.SessionOptions()
     # Its own default counts the machine's cores, also those that this process may not use.
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     options.intra_op_num_threads = usable or 1
     options.log_severity_level = 3
-    try:
-        session = ort.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # its exceptions have no common class of their own
-        raise InputError(f"cannot be loaded ({error})", source, "make it again") from None
+    session = ort.InferenceSession(weights, options, providers=["CPUExecutionProvider"])
     name = session.get_inputs()[0].name
     return lambda x: session.run(None, {name: x})[0]
 
 
-def _opencv(weights: bytes, source: str) -> _Runner:
-    try:
-        net = cv2.dnn.readNetFromONNX(np.frombuffer(weights, np.uint8))
-    except cv2.error:
-        raise InputError("cannot be loaded by OpenCV", source, "install ONNX Runtime") from None
+def _opencv(weights: bytes) -> _Runner:
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(weights, np.uint8))
 
     def run(x: NDArray[np.float32], /) -> NDArray[np.float32]:
         net.setInput(x)

@@ -69,6 +69,15 @@ SHARD = Kind("shard", "a shard", 1 << 20)
 ANY = Kind("file", "a file", 2048)
 
 
+def exists(path: str | Path) -> bool:
+    """Tell whether a path leads to anything; a name that no system takes does not."""
+    try:
+        os.stat(path)
+    except (OSError, ValueError):
+        return False
+    return True
+
+
 def is_file(path: str | Path) -> bool:
     """Tell whether a path leads to a regular file; a name that no system takes does not."""
     try:

@@ -54,7 +54,7 @@ def read_json(path: str | Path, todo: str = "give a solution or truth file") -> 
     return parse_json(read_text(path, JSON), str(path), todo)
 
 
-def parse_json(text: str | bytes, source: str, todo: str) -> dict[str, Any]:
+def parse_json(text: str, source: str, todo: str) -> dict[str, Any]:
     """Read a JSON object from a text; see :func:`read_json`."""
     try:
         data = json.loads(text)

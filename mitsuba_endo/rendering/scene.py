@@ -1,7 +1,7 @@
 """Loading scene files and reading camera, projector and surface out of them."""
 
 import re
-import tempfile
+import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -15,12 +15,14 @@ from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
+from ..litter import scratch_folder
 from ..reading.regular import is_file
 from ..reading.xml_guard import read_xml
 from ..shapes import Mesh
 from . import keys
 from .axes import pose_from_to_world
 from .generated import generate
+from .scene_references import check_references
 
 PACKAGED = "mitsuba_endo.scenes"
 
@@ -141,7 +143,8 @@ def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[s
     from .untyped import mi
 
     path = find_scene(source)
-    declared = _declared(path)
+    root = _root(path)
+    declared = _declared(root)
     unknown = sorted(set(parameters) - set(declared))
     if unknown:
         raise InputError(
@@ -153,8 +156,9 @@ def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[s
     for name, value in values.items():
         if "nan" in re.split(r"[\s,]+", value.strip().lower()):  # would only blacken the image
             raise InputError(f"parameter {name!r} is {value}", str(source), "give it a number")
-    with tempfile.TemporaryDirectory(prefix="mitsuba-endo-") as folder:
-        resolved = {name: generate(name, value, Path(folder)) for name, value in values.items()}
+    with scratch_folder() as folder:
+        resolved = {name: generate(name, value, folder) for name, value in values.items()}
+        check_references(root, path.parent, resolved)
         try:
             return mi.load_file(str(path), **resolved), values
         except RuntimeError as error:
@@ -184,11 +188,15 @@ def find_scene(source: str | Path) -> Path:
     )
 
 
-def _declared(path: Path) -> dict[str, str]:
-    """Return the parameters that the scene declares, with their defaults."""
+def _root(path: Path) -> ET.Element:
     root = read_xml(path)
     if root.tag != "scene":
         raise InputError(f"starts with <{root.tag}>", str(path), "give a Mitsuba scene file")
+    return root
+
+
+def _declared(root: ET.Element) -> dict[str, str]:
+    """Return the parameters that the scene declares, with their defaults."""
     return {d.attrib["name"]: d.attrib["value"] for d in root.iter("default")
             if {"name", "value"} <= d.attrib.keys()}  # fmt: skip
 
