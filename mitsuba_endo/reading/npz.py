@@ -3,6 +3,7 @@
 import contextlib
 import math
 import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
@@ -18,9 +19,9 @@ from .regular import ARRAYS, regular
 _BROKEN = (
     ValueError, TypeError, KeyError, IndexError, OSError, EOFError, RuntimeError, OverflowError,
     MemoryError, SyntaxError, RecursionError, NotImplementedError, struct.error,
-    zipfile.BadZipFile, zlib.error, UnicodeDecodeError,
+    zipfile.BadZipFile, zlib.error, tokenize.TokenError,
 )  # fmt: skip
-"""What zipfile and NumPy raise for damaged files. SyntaxError: headers are Python literals."""
+"""What zipfile and NumPy raise for damaged files, whose headers are Python literals."""
 _ENCRYPTED = 0x1
 _HEADER = 10_000
 """Characters of an array's header; ours have a hundred."""

@@ -76,9 +76,10 @@ def load_surface(path: str | Path) -> SurfaceEstimate:
     mesh = read_mesh(path)
     vertices, faces = np.array(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     raw = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")
-    std = raw[STD_PROPERTY] if raw is not None and STD_PROPERTY in (raw.dtype.names or ()) else None
-    if std is None:
+    names = getattr(getattr(raw, "dtype", None), "names", None) or raw or ()  # text: a mapping
+    if raw is None or STD_PROPERTY not in names:
         return SurfaceEstimate(vertices, faces)
+    std = np.asarray(raw[STD_PROPERTY])
     if std.shape != (len(vertices),) or std.dtype.kind not in "fiu":
         raise InputError(f"{STD_PROPERTY} is no number a vertex", str(path), "make it again")
     return SurfaceEstimate(vertices, faces, std.astype(np.float64))
