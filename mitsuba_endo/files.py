@@ -122,6 +122,10 @@ def _make_parent(path: Path) -> None:
 def not_writable(path: str | Path, error: OSError) -> InputError:
     """Return the sentence for what the system says of writing a file or folder."""
     reason = (error.strerror or str(error)).lower()
-    full = "make room or choose a folder on another disk"
-    todo = full if error.errno in FULL else "choose a folder you may write to"
+    if error.errno in FULL:
+        todo = "make room or choose a folder on another disk"
+    elif error.errno is None:  # a library's word for whatever happened
+        todo = "see whether the disk is full, or choose another folder"
+    else:
+        todo = "choose a folder you may write to"
     return InputError(f"cannot be written ({reason})", str(path), todo)

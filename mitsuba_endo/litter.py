@@ -78,7 +78,14 @@ def scratch_folder() -> Iterator[Path]:
     """Yield a temporary folder that is gone afterwards, at the latest with the next command."""
     sweep_scratch()
     folder = aside_of(Path(tempfile.gettempdir()) / _SCRATCH, "partial")
-    folder.mkdir(mode=0o700)
+    try:
+        folder.mkdir(mode=0o700)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(
+            f"no temporary folder can be made ({reason})", tempfile.gettempdir(),
+            "make room there, or set TMPDIR to another folder",
+        ) from error  # fmt: skip
     try:
         yield folder
     finally:

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from ..errors import InputError
 from .entry import EXIT_INTERRUPTED, INTERRUPTED
+from .faults import internal, sentence
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -81,13 +81,12 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
             # off.
             exec("")
             _fail(INTERRUPTED, EXIT_INTERRUPTED, as_json)
-        if isinstance(error, InputError):
-            _fail(str(error), error.exit_code, as_json)
+        told = sentence(error)
+        if told is not None:
+            _fail(*told, as_json)
         if debug:
             traceback.print_exc()
-        hint = "please report it" if debug else "see it with --debug, and please report it"
-        text = f"internal fault ({type(error).__name__}: {error}); {hint}."
-        _fail(text, EXIT_INTERNAL, as_json)
+        _fail(internal(error, debug), EXIT_INTERNAL, as_json)
 
 
 def _is_interrupt(error: BaseException) -> bool:

@@ -177,15 +177,12 @@ def _sized(frames: "Iterator[ImageFrame]", rig: "Rig") -> "Iterator[ImageFrame]"
 
 
 def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid") -> None:
-    import cv2
-
+    from ..png import write_png
     from ..records.correspondence import WEIGHT, save_map
     from ..show.grid_picture import grid_picture
 
     picture = grid_picture(frame.image, result)
-    # OpenCV reports a full disk by its return value only.
-    if not cv2.imwrite(str(folder / f"{frame.name}_graph.png"), picture):
-        raise OSError("the picture was not written")
+    write_png(folder / f"{frame.name}_graph.png", picture)
     if result.reason:
         return
     further = {"confidence": result.confidence, WEIGHT: result.weight}

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import typer
 
 from .. import __version__
+from ..litter import sweep, sweep_scratch
 from .console import EXIT_FAULT, Debug, Json, Quiet, Session, session
 
 if TYPE_CHECKING:
@@ -60,7 +61,16 @@ def examine(out: Session) -> list[Check]:
                 checks.append(Check(name, "not tried", "needs llvm_ad_rgb or cuda_ad_rgb"))
             else:
                 checks.append(_judge(name, *run_probe(name)))
-    return _without_needless_faults(checks)
+    return [*_without_needless_faults(checks), _leftovers()]
+
+
+def _leftovers() -> Check:
+    """Remove what processes that were killed left half written, here and in the temporary folder.
+
+    Other folders are cleared by the next command that writes there.
+    """
+    removed = [*sweep_scratch(), *sweep(Path.cwd())]
+    return Check("leftovers", "ok", f"removed {len(removed)}" if removed else "none")
 
 
 def _has_variant(checks: list[Check]) -> bool:

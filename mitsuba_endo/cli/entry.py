@@ -1,4 +1,4 @@
-"""Entry point of ``mitsuba-endo``: sees to Ctrl-C before anything else is loaded."""
+"""Entry point of ``mitsuba-endo``: sees to Ctrl-C and SIGTERM before anything else is loaded."""
 
 import signal
 import sys
@@ -24,12 +24,13 @@ def main() -> None:
 
 
 def _see_to_interrupts() -> None:
-    # Where Ctrl-C is ignored, as in a background job of a script, it stays ignored. Windows has no
-    # alarm by which to try again.
-    taken = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    if taken or not hasattr(signal, "setitimer"):
+    # Where a signal is ignored, as Ctrl-C in a background job of a script, it stays ignored.
+    # Windows has no alarm by which to try again.
+    if not hasattr(signal, "setitimer"):
         return
-    signal.signal(signal.SIGINT, interrupt_after_loading)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
+            signal.signal(number, interrupt_after_loading)
     signal.signal(signal.SIGALRM, interrupt_after_loading)
 
 

@@ -50,7 +50,7 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback(
     epilog="Exit codes: 0 done, 1 not converged or a fault found, 2 bad input, "
-    "3 no pattern found, 70 internal error, 130 interrupted."
+    "3 no pattern found, 70 internal error, 71 no memory or threads left, 130 interrupted."
 )
 def _root(
     version: Annotated[

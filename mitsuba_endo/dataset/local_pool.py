@@ -4,6 +4,7 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -148,6 +149,17 @@ class LocalPool:
         self._workers.clear()
 
 
+def _end_with_parent() -> None:
+    """End this process as soon as the one that started it is gone, in the middle of a sample.
+
+    It would write on for seconds while another run has the folder.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os._exit(1)
+
+
 def _serve(
     connection: Any,
     job: DatasetJob,
@@ -157,6 +169,7 @@ def _serve(
     """Make the samples whose numbers come in, until the other end closes."""
     # Ctrl-C reaches the whole group; the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     prepare()
     while True:
         try:

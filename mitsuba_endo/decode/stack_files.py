@@ -4,12 +4,12 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from ..errors import InputError
 from ..files import atomic_folder
 from ..folder_mark import Kind
+from ..png import write_png
 from .image_files import full_scale, images_of, read_image
 from .plan import StackPlan
 from .stack import Stack, patterns
@@ -28,9 +28,7 @@ def save_patterns(folder: str | Path, plan: StackPlan) -> list[str]:
     names = [f"{i:0{digits}d}_{label}.png" for i, label in enumerate(labels)]
     with atomic_folder(folder, Kind.PATTERNS) as aside:
         for name, image in zip(names, patterns(plan), strict=True):
-            # OpenCV reports a full disk by its return value only.
-            if not cv2.imwrite(str(aside / name), image):
-                raise OSError("the image was not written")
+            write_png(aside / name, image)
     return names
 
 

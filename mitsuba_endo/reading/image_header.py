@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator
 
 _SLACK = 4096
+_PNG = b"\x89PNG\r\n\x1a\n"
 _DEFLATE = 1032
 """How much deflate shrinks at most."""
 
@@ -32,6 +33,12 @@ def _png(data: bytes) -> tuple[int, int]:
         raise ValueError
     samples = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}.get(colour, 4)
     _check(width * height * samples * bits // 8, _DEFLATE * len(data))
+    at = len(_PNG)
+    while at < len(data):  # OpenCV takes memory for a chunk as long as it says it is
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        at += length + 12
+    if at > len(data):
+        raise ValueError
     return width, height
 
 
@@ -105,7 +112,7 @@ def _check(needed: int, held: int) -> None:
 
 
 _READERS = {
-    b"\x89PNG\r\n\x1a\n": _png,
+    _PNG: _png,
     b"\xff\xd8": _jpeg,
     b"BM": _bmp,
     b"II*\0": _tiff,

@@ -1,10 +1,11 @@
 """Whether correspondence maps and a rig belong together, asked before any work is done."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from .correspondence import CorrespondenceMap
 from .rig import Rig
 
@@ -12,6 +13,47 @@ MIN_CORRESPONDENCES = 50
 """With fewer, the pose, the focal length and a surface cannot be told from noise."""
 MIN_SHARE_ON_PATTERN = 0.5
 """Outliers and a wrong centre leave more than this on the pattern; wrong units do not."""
+
+
+def as_maps(maps: Iterable[CorrespondenceMap]) -> list[CorrespondenceMap]:
+    """Return maps that were given from Python as a list, if they are maps.
+
+    Raises:
+        InputError: a single map, a path, something else than maps in it, or arrays of another
+            shape or type than a map's.
+    """
+    if isinstance(maps, CorrespondenceMap | str | Path) or not isinstance(maps, Iterable):
+        raise InputError(
+            f"is {shown(type(maps).__name__)} and no list", "maps", "give [load_map(path), ...]"
+        )
+    found = list(maps)
+    for k, map_ in enumerate(found):
+        if not isinstance(map_, CorrespondenceMap):
+            what = f"is {shown(type(map_).__name__)} and no map"
+            raise InputError(what, f"maps[{k}]", "give [load_map(path), ...]")
+        _check_arrays(map_)
+    return found
+
+
+def _check_arrays(map_: CorrespondenceMap) -> None:
+    q, weight = map_.q, map_.weight
+    if not _is_numbers(q) or q.ndim != 3 or q.shape[2] != 2:
+        form = getattr(q, "shape", type(q).__name__)
+        raise InputError(f"q is {form}, not (H, W, 2) numbers", f"{map_.name}: map", "mend it")
+    if weight is None:
+        return
+    if not _is_numbers(weight) or weight.shape != q.shape[:2]:
+        form = getattr(weight, "shape", type(weight).__name__)
+        raise InputError(f"weight is {form}, not (H, W) numbers", f"{map_.name}: map", "mend it")
+    if not (weight[map_.valid] >= 0).all():
+        raise InputError(
+            "weight is negative or missing where the map has a coordinate", f"{map_.name}: map",
+            "give 0 where nothing is known",
+        )  # fmt: skip
+
+
+def _is_numbers(array: object) -> bool:
+    return isinstance(array, np.ndarray) and array.dtype.kind in "fiu"
 
 
 def check_maps(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
@@ -22,6 +64,9 @@ def check_maps(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
             without a :func:`fault`, or a known distance between points that are not in the maps;
             names the map and the rig's field.
     """
+    if not isinstance(rig, Rig):
+        what = f"is {shown(type(rig).__name__)} and no rig"
+        raise InputError(what, "rig", "give load_rig(path)")
     if not maps:
         raise InputError("no correspondence map is given", todo="give at least one")
     names = [map_.name for map_ in maps]

@@ -42,9 +42,9 @@ class Camera(Record):
     distortion: list[Real] = []
     """Coefficients in the model's order: k1, k2, p1, p2, k3[, k4, k5, k6]; fisheye k1..k4; omni
     xi, k1, k2, p1, p2, k3; double_sphere xi, alpha; scaramuzza b1..b4, d, e."""
-    K_std: Annotated[list[PositiveFloat], Field(min_length=4, max_length=4)] | None = None
+    K_std: Annotated[list[Length], Field(min_length=4, max_length=4)] | None = None
     """Standard deviations of fx, fy, cx, cy, pixels: a prior where they are unknowns."""
-    distortion_std: PositiveFloat | list[PositiveFloat] | None = None
+    distortion_std: Length | list[Length] | None = None
     """Standard deviation of every coefficient, or one for all, likewise."""
 
     @field_validator("model")

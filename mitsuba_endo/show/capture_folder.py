@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from ..files import atomic_folder, atomic_path
+from ..files import atomic_folder
 from ..folder_mark import Kind
+from ..png import write_png
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import save_map, write_exr
 from ..records.known_input import known_rig, save_rig
@@ -39,7 +39,7 @@ def write_capture_folder(path: str | Path, capture: Capture, loaded: LoadedScene
     """
     with atomic_folder(path, Kind.CAPTURE) as folder:
         write_exr(folder / "image.exr", {c: capture.image[..., i] for i, c in enumerate("RGB")})
-        _write_png(folder / "image.png", tonemap(capture.image))
+        write_png(folder / "image.png", tonemap(capture.image)[..., ::-1])
         save_map(folder / MAP, capture.correspondences())
         write_exr(folder / "depth.exr", {"Z": capture.depth})
         axes = {f"normal.{c}": capture.normals[..., i] for i, c in enumerate("xyz")}
@@ -60,11 +60,3 @@ def _surface_in_camera(loaded: LoadedScene) -> SurfaceEstimate:
     camera_from_world = loaded.world_from_camera().inverse()
     vertices = camera_from_world.apply(np.asarray(mesh.vertices, np.float64))
     return SurfaceEstimate(vertices, np.asarray(mesh.faces, np.int64))
-
-
-def _write_png(path: Path, image: np.ndarray) -> None:
-    encoded, data = cv2.imencode(".png", image[..., ::-1])
-    if not encoded:
-        raise ValueError(f"an image of shape {image.shape} cannot be a PNG")
-    with atomic_path(path) as aside:
-        aside.write_bytes(data.tobytes())

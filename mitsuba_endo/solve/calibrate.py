@@ -1,6 +1,6 @@
 """Calibration: from correspondence maps and a rig to projector, poses and surface."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 from ..geometry.laws import LAWS
 from ..records.calibration import Calibration
 from ..records.checkpoint import Checkpoint
+from ..records.consistency import as_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
@@ -24,7 +25,7 @@ from .reporting.assemble import assemble
 
 
 def calibrate(
-    maps: list[CorrespondenceMap],
+    maps: Iterable[CorrespondenceMap],
     rig: Rig,
     options: Options | None = None,
     progress: Progress | None = None,
@@ -50,7 +51,7 @@ def calibrate(
     options = options or Options()
     say = progress or (lambda _share, _step: None)
     minimiser_of(options)  # an unknown one is told before any work
-    examined = examine(maps, rig)
+    examined = examine(as_maps(maps), rig)
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"), examined.told_on_failure():

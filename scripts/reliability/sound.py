@@ -109,7 +109,8 @@ def _meshes(folder: Path) -> None:
     mesh.apply_translation([0, 0, 50])
     for name in ("a.ply", "a.stl", "a.obj", "a.off", "a.glb"):
         mesh.export(folder / name)
-    (folder / "ascii.ply").write_bytes(mesh.export(file_type="ply", encoding="ascii"))
+    text: Any = mesh.export(file_type="ply", encoding="ascii")
+    (folder / "ascii.ply").write_bytes(text)
 
 
 def _network(folder: Path) -> None:

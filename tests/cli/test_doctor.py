@@ -16,7 +16,7 @@ def test_working_installation():
     data = json.loads(result.stdout)
     assert result.exit_code == 0, data
     status = {check["name"]: check["status"] for check in data["checks"]}
-    assert set(status) == {"versions", *doctor.PROBES}
+    assert set(status) == {"versions", "leftovers", *doctor.PROBES}
     needed = ("llvm_ad_rgb", "threads", "exr", "plugins")
     assert [status[name] for name in needed] == ["ok"] * len(needed)
 
