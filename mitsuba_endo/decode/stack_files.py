@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..files import atomic_folder
 from ..folder_mark import Kind
 from ..png import write_png
+from ..reading.regular import is_file
 from .image_files import full_scale, images_of, read_image
 from .plan import StackPlan
 from .stack import Stack, patterns
@@ -42,7 +43,7 @@ def stack_paths(given: Sequence[str | Path]) -> list[Path]:
     if len(paths) == 1 and paths[0].is_dir():
         return images_of(paths[0])
     for path in paths:
-        if not path.is_file():
+        if not is_file(path):
             raise InputError("no such image", str(path), "give image files or one folder")
     return paths
 

@@ -15,7 +15,7 @@ _LONGEST = 1 << 20
 """Bytes of header that are looked at; cameras write a few thousand."""
 _TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
 _LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
-"""Lines of a chunk by the number of the compression."""
+"""Lines of a chunk by the number of the compression; later ones have at most as many."""
 _RATIO = (1, 128, 1032, 1032)
 """How much none, run lengths and deflate (of one line, of 16) shrink at most; others at will."""
 _CHUNK = 16
@@ -61,7 +61,8 @@ def _holds(header: Header, size: int) -> bool:
     raw = header.width * header.height * header.sample_bytes
     if header.compression < len(_RATIO) and raw > _RATIO[header.compression] * (size + _SLACK):
         return False
-    chunks = -(-header.height // _LINES[header.compression])
+    known = header.compression < len(_LINES)
+    chunks = -(-header.height // (_LINES[header.compression] if known else max(_LINES)))
     return header.tiled or chunks * _CHUNK <= size
 
 
@@ -75,8 +76,6 @@ def _parse(data: bytes) -> Header:
     if width < 1 or height < 1:
         raise ValueError("no pixels")
     compression = found["compression"][0]
-    if compression >= len(_LINES):
-        raise ValueError("unknown compression")
     bytes_, samplings = _channels(found["channels"])
     subsampled = any(s != (1, 1) for s in samplings)
     tiled = bool(version & _TILED)

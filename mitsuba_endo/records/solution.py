@@ -1,5 +1,6 @@
 """The result of a calibration, and the truth of a synthetic one: the same structure."""
 
+import os
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -207,7 +208,7 @@ def load_solution(path: str | Path) -> Solution:
         InputError: names the file and field.
     """
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):  # which takes names of any length
         name, other = "solution.json", "truth.json"
         only_other = (path / other).exists() and not (path / name).exists()
         path = path / (other if only_other else name)

@@ -10,6 +10,7 @@ from ..evaluate.depth import RayCaster
 from ..evaluate.errors import Pair, first_from_truth, match_frames
 from ..evaluate.shape import Alignment, alignment_of
 from ..geometry.transforms import RigidTransform
+from ..reading.regular import is_file
 from ..records.calibration import Calibration, SurfaceEstimate
 from ..records.solution import Solution, load_solution
 from ..records.surface import load_surface
@@ -38,7 +39,7 @@ def find_truth(result: str | Path, solution: Solution) -> Path | None:
     folder = folder if folder.is_dir() else folder.parent
     for name in NAMES:
         path = folder / name
-        if path.is_file():
+        if is_file(path):
             try:
                 truth = load_solution(path)
                 _, matched_by = match_frames(solution, truth)
@@ -53,7 +54,7 @@ def find_truth(result: str | Path, solution: Solution) -> Path | None:
 def _is_decoded(solution: Solution, truth: Solution, folder: Path) -> bool:
     """Tell whether the one frame is called as the capture's image, from which it was decoded."""
     image = folder / Path(solution.frames[0].name).with_suffix(".png").name
-    return len(truth.frames) == 1 and image.is_file()
+    return len(truth.frames) == 1 and is_file(image)
 
 
 def read_truth(path: str | Path, solution: Solution) -> tuple[Solution, list[Pair]]:

@@ -115,9 +115,12 @@ def _frames(name: str) -> Use:
 
 def _network(engine: str) -> Use:
     def use(folder: Path) -> None:
-        from mitsuba_endo.decode.grid.network import load_network
+        from mitsuba_endo.decode.network import describe, load_network
 
-        network = load_network(folder / "decoder.onnx", engine)  # type: ignore[arg-type]
+        path = folder / "decoder.onnx"
+        # With a checksum that is right: it is what the file holds that is to be refused.
+        path.with_suffix(".json").write_text(describe(path.read_bytes(), {}), encoding="utf-8")
+        network = load_network(path, engine)  # type: ignore[arg-type]
         network.heads(np.zeros((40, 48), np.uint8))
 
     return use

@@ -14,6 +14,7 @@ from ...folder_mark import Kind
 from ...geometry.cameras import CameraModel
 from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
+from ...reading.regular import is_file
 from ...records.solution import Solution
 from ...records.surface import load_surface
 from ..map_names import observed_names, own_surface_name
@@ -67,7 +68,7 @@ def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list
     camera, frames = known_camera(solution), solution.frames
     poses = [camera_pose(frame) for frame in frames]
     own = [folder / own_surface_name(k) for k in range(1, len(frames))]
-    paths = [folder / str(solution.surface), *(path for path in own if path.is_file())]
+    paths = [folder / str(solution.surface), *(path for path in own if is_file(path))]
     surfaces = [
         pose.apply(load_surface(path).vertices) for path, pose in zip(paths, poses, strict=False)
     ]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...geometry.cameras import CameraModel
 from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
+from ...reading.regular import is_file
 from ...records.solution import Frame
 from ..read_folder import read_observed
 
@@ -47,7 +48,7 @@ def sightings(
     A point is seen where the used correspondences around its pixel, interpolated, agree with its
     projection into the pattern: that of a hidden point is another. None are where there is no map.
     """
-    if not observed.is_file():
+    if not is_file(observed):
         nowhere = np.zeros((0, 2))
         return Sightings(np.zeros(0, np.int64), nowhere, nowhere, np.zeros(0))
     q, used = read_observed(observed)
