@@ -10,11 +10,14 @@ import os
 import sys
 from pathlib import Path
 
+from . import memory
 from .errors import InputError
 
 LLVM_PACKAGE = "karellen-llvm-core"
 MINIMUM_LLVM = (17,)
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
+LEAST_MEMORY = 512 << 20
+"""Bytes of address space: Mitsuba and LLVM take 220 MiB to start, kernels come on top."""
 
 
 def use(*variants: str) -> str:
@@ -25,8 +28,12 @@ def use(*variants: str) -> str:
 
     Raises:
         InputError: Dr.Jit was imported before LLVM could be pointed out, or no usable LLVM.
+        MemoryError: the system leaves the process less than they need.
     """
     todo = _advice()
+    free = memory.left()
+    if free is not None and free < LEAST_MEMORY:  # LLVM would end the process by a signal
+        raise MemoryError(f"{free >> 20} MiB of address space are left for Mitsuba")
     locate_llvm()
     import mitsuba as mi
 

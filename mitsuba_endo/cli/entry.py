@@ -4,8 +4,18 @@ import signal
 import sys
 from types import FrameType
 
+from ..memory import left
+
 EXIT_INTERRUPTED = 130
 INTERRUPTED = "interrupted; no output was left half written."
+EXIT_MEMORY = 71
+"""The system gives no more memory, threads or files (EX_OSERR of sysexits.h)."""
+SHORT = (
+    "the system gives no more memory or threads; close other programs, or raise the limit "
+    "(`ulimit -v`, `ulimit -u`)."
+)
+LEAST_MEMORY = 900 << 20
+"""Bytes of address space: below, libraries end the process by a signal, or hang, when loaded."""
 RETRY = 0.05
 """Seconds after which an interrupt that came while a module was loaded is tried again."""
 LOADER = "<frozen importlib._bootstrap>"
@@ -14,6 +24,10 @@ LOADER = "<frozen importlib._bootstrap>"
 def main() -> None:
     """Run the command line."""
     _see_to_interrupts()
+    free = left()
+    if free is not None and free < LEAST_MEMORY:
+        print(f"error: {SHORT}", file=sys.stderr)
+        sys.exit(EXIT_MEMORY)
     try:
         from .main import app
 

@@ -3,10 +3,9 @@
 import errno
 
 from ..errors import InputError, shown
+from .entry import EXIT_MEMORY, SHORT
 
 EXIT_INPUT = 2
-EXIT_MEMORY = 71
-"""The system gives no more memory, threads or files (EX_OSERR of sysexits.h)."""
 _SYSTEM = {
     errno.ENOSPC: "make room", errno.EDQUOT: "make room", errno.EFBIG: "raise `ulimit -f`",
     errno.EROFS: "choose another folder", errno.EACCES: "choose another folder",
@@ -25,11 +24,7 @@ def sentence(error: BaseException) -> tuple[str, int] | None:
     if isinstance(error, InputError):
         return str(error), error.exit_code
     if _is_shortage(error):
-        return (
-            "the system gives no more memory or threads; close other programs, or raise the limit "
-            "(`ulimit -v`, `ulimit -u`).",
-            EXIT_MEMORY,
-        )
+        return SHORT, EXIT_MEMORY
     if isinstance(error, OSError) and error.errno in _SYSTEM:
         reason = (error.strerror or str(error)).lower()
         where = f"{error.filename}: " if error.filename else ""

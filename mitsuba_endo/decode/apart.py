@@ -15,13 +15,13 @@ import sys
 import time
 import weakref
 from collections.abc import Callable
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..memory import limit_to
 
 Floats = NDArray[np.float32]
 Load = Callable[[bytes], Callable[[Floats], Floats]]
@@ -33,7 +33,7 @@ RUN_S = 300.0
 _HEAD = struct.Struct("<cQ")
 _DONE, _FAULT = b"d", b"f"
 _MEMORY = 2 << 30
-"""Bytes that a network may take beside its engine."""
+"""Bytes that a network may take beside its engine: broken ones ask for all there is."""
 _PER_VALUE = 4096
 """Bytes more for each value of its input."""
 
@@ -146,11 +146,11 @@ def serve(load: Load) -> None:
             return
         try:
             if run is None:
-                _limit_memory(0)
+                limit_to(_MEMORY)
                 run, answer = load(message), b""
             else:
                 x = np.load(io.BytesIO(message), allow_pickle=False)
-                _limit_memory(x.size)
+                limit_to(_MEMORY + _PER_VALUE * x.size)
                 stream = io.BytesIO()
                 np.save(stream, run(x))
                 answer = stream.getvalue()
@@ -158,20 +158,6 @@ def serve(load: Load) -> None:
         except Exception as error:  # whatever an engine raises for what it was given
             _send(answers, _FAULT, f"cannot be run ({type(error).__name__}: {error})".encode())
             return
-
-
-def _limit_memory(values: int) -> None:
-    """Let the process take so much more than it has: broken networks ask for all there is.
-
-    Linux only: elsewhere there is no such limit.
-    """
-    with contextlib.suppress(ImportError, OSError, ValueError):
-        import resource
-
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        most = pages * resource.getpagesize() + _MEMORY + _PER_VALUE * values
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
 
 
 if __name__ == "__main__":

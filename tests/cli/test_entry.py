@@ -1,4 +1,4 @@
-"""Ctrl-C before and while libraries are loaded."""
+"""Ctrl-C and SIGTERM before and while libraries are loaded."""
 
 import subprocess
 import sys
@@ -10,11 +10,11 @@ HOOK = """
 import os, signal, sys
 
 class Interrupt:
-    # Sends SIGINT to its own process when a module is first looked for.
+    # Sends a signal to its own process when a module is first looked for.
     def find_spec(self, name, path=None, target=None):
         if name == {module!r} and self in sys.meta_path:
             sys.meta_path.remove(self)
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.{number})
 
 sys.meta_path.insert(0, Interrupt())
 sys.argv = ["mitsuba-endo", *{arguments!r}]
@@ -31,11 +31,14 @@ RUN = "from mitsuba_endo.cli.entry import main; main()"
         "mitsuba_endo.rendering.scene",
     ],
 )
-def test_an_interrupt_while_a_module_is_loaded_ends_the_command(module: str, tmp_path: Path):
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_an_interrupt_while_a_module_is_loaded_ends_the_command(
+    module: str, number: str, tmp_path: Path
+):
     """Oracle: exit code 130, one sentence or none, and an empty folder."""
     out = tmp_path / "made"
     hook = HOOK.format(
-        module=module, arguments=["render", "plane", "--spp", "1", "--out", str(out)]
+        module=module, number=number, arguments=["render", "plane", "--spp", "1", "--out", str(out)]
     )
     done = subprocess.run([sys.executable, "-c", hook + RUN], capture_output=True, text=True,
                           timeout=120)  # fmt: skip
@@ -47,6 +50,6 @@ def test_an_interrupt_while_a_module_is_loaded_ends_the_command(module: str, tmp
 
 def test_the_hook_interrupts():
     """Oracle: without this package's handler Python raises KeyboardInterrupt there."""
-    hook = HOOK.format(module="networkx", arguments=[])
+    hook = HOOK.format(module="networkx", number="SIGINT", arguments=[])
     run = "try:\n    import networkx\nexcept KeyboardInterrupt:\n    sys.exit(7)"
     assert subprocess.run([sys.executable, "-c", hook + run], timeout=60).returncode == 7

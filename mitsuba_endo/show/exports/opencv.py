@@ -54,26 +54,27 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
     poses = [(projector_pose(f), camera_pose(f)) for f in solution.frames]
     projectors = [known_projector(solution, f) for f in solution.frames]
     kind = camera_in(camera, _MODELS, "OpenCV")
+    # In memory: to a full disk OpenCV writes half of it and says nothing.
+    how = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
+    storage = cv2.FileStorage(path.suffix.lower(), how)
+    storage.write("units", solution.units)
+    storage.write("image_width", camera.width)
+    storage.write("image_height", camera.height)
+    storage.write("fisheye_model", int(kind == "fisheye"))
+    storage.write("camera_matrix", np.asarray(camera.K, np.float64))
+    _write_lens(storage, camera, kind)
+    storage.write("projector_law", projectors[0].law)
+    storage.write("projector_width", size[0])
+    storage.write("projector_height", size[1])
+    storage.write("projector_matrix", projector_matrix(projectors[0]))
+    distortion = _row(projectors[0].distortion.coefficients, 5)
+    storage.write("projector_distortion_coefficients", distortion)
+    storage.write("R", poses[0][0].R)
+    storage.write("T", poses[0][0].t.reshape(3, 1))
+    _write_frames(storage, solution.frames, projectors, poses)
+    text = storage.releaseAndGetString()
     with atomic_path(path) as aside:
-        storage = cv2.FileStorage(str(aside), cv2.FILE_STORAGE_WRITE)
-        if not storage.isOpened():
-            raise InputError("cannot be written", str(path), "choose a folder you may write to")
-        storage.write("units", solution.units)
-        storage.write("image_width", camera.width)
-        storage.write("image_height", camera.height)
-        storage.write("fisheye_model", int(kind == "fisheye"))
-        storage.write("camera_matrix", np.asarray(camera.K, np.float64))
-        _write_lens(storage, camera, kind)
-        storage.write("projector_law", projectors[0].law)
-        storage.write("projector_width", size[0])
-        storage.write("projector_height", size[1])
-        storage.write("projector_matrix", projector_matrix(projectors[0]))
-        distortion = _row(projectors[0].distortion.coefficients, 5)
-        storage.write("projector_distortion_coefficients", distortion)
-        storage.write("R", poses[0][0].R)
-        storage.write("T", poses[0][0].t.reshape(3, 1))
-        _write_frames(storage, solution.frames, projectors, poses)
-        storage.release()
+        aside.write_text(text, encoding="utf-8")
 
 
 def _write_lens(storage: cv2.FileStorage, camera: CameraModel, kind: str) -> None:
