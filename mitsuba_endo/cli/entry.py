@@ -16,6 +16,9 @@ SHORT = (
 )
 LEAST_MEMORY = 900 << 20
 """Bytes of address space: below, libraries end the process by a signal, or hang, when loaded."""
+_SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGALRM") if hasattr(signal, name)
+]
 RETRY = 0.05
 """Seconds after which an interrupt that came while a module was loaded is tried again."""
 LOADER = "<frozen importlib._bootstrap>"
@@ -35,6 +38,8 @@ def main() -> None:
     except KeyboardInterrupt:
         print(f"error: {INTERRUPTED}", file=sys.stderr)
         sys.exit(EXIT_INTERRUPTED)
+    finally:
+        _let_end()
 
 
 def _see_to_interrupts() -> None:
@@ -42,10 +47,16 @@ def _see_to_interrupts() -> None:
     # Windows has no alarm by which to try again.
     if not hasattr(signal, "setitimer"):
         return
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _SIGNALS:
         if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
             signal.signal(number, interrupt_after_loading)
-    signal.signal(signal.SIGALRM, interrupt_after_loading)
+
+
+def _let_end() -> None:
+    """Ignore signals while the interpreter ends: what was to be done is done, and said."""
+    for number in _SIGNALS:
+        if signal.getsignal(number) is interrupt_after_loading:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def interrupt_after_loading(number: int, frame: FrameType | None) -> None:
