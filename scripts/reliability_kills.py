@@ -79,8 +79,11 @@ class Patient:
         left = _litter(self.folder)
         if left:
             self.faults.append(f"left over after the next run: {left}")
-        if self._is_dataset and _contents(self.folder / self.command.out) != self.whole:
-            self.faults.append("the dataset differs from the uninterrupted one")
+        if self._is_dataset:
+            now = _contents(self.folder / self.command.out)
+            other = [k for k in {*now, *self.whole} if now.get(k) != self.whole.get(k)]
+            if other:
+                self.faults.append(f"differs from the uninterrupted one in {sorted(other)[:5]}")
 
     @property
     def _is_dataset(self) -> bool:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from ..interrupts import uninterrupted
 from .work import DatasetJob, Result, prepare, produce
 
 RETRIES = 1
@@ -128,7 +129,8 @@ class LocalPool:
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(theirs, *self._arguments), daemon=True)
-        process.start()
+        with uninterrupted():  # a child that is half started prints a traceback
+            process.start()
         theirs.close()  # so that its end is noticed on ours
         return _Worker(process, ours, self._recycle)
 

@@ -11,7 +11,7 @@ from mitsuba_endo.records.calibration import (
     SurfaceEstimate,
     TraceRow,
 )
-from mitsuba_endo.records.checkpoint import Checkpoint
+from mitsuba_endo.records.checkpoint import Checkpoint, SurfaceRecord
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.solution import (
     Alternative,
@@ -76,12 +76,15 @@ def _snapshot(i: int, surface: SurfaceEstimate) -> Snapshot:
 def _checkpoint(surface: SurfaceEstimate) -> Checkpoint:
     count = len(surface.vertices)
     index = np.stack(np.divmod(np.arange(count), 16), -1)
+    lattice = {"cell": np.array(0.05), "ij": index, "faces": surface.faces}
     return Checkpoint(
-        law="pinhole", stage=1, names=list(NAMES), used=[np.ones((HEIGHT, WIDTH), bool)] * 2,
-        cells=[0.05], lattices=[index], faces=[surface.faces], weights=[0.1], disparities=[1800.0],
-        rho=[np.full(count, 0.01)], world_from_camera=[s.inverse() for s in STEPS],
-        projector_from_camera=[POSE] * 2,
-        intrinsics=[np.array([FOCAL, 118.0, 61.0, 1.0, 0, 0, 0, 0, 0])] * 2,
+        law="pinhole", last_stage=True, names=list(NAMES),
+        used=[np.ones((HEIGHT, WIDTH), bool)] * 2,
+        surfaces=[SurfaceRecord("lattice", lattice, np.full(count, 0.01), 0.1, 1800.0)],
+        values={
+            "camera_pose": [s.inverse().matrix() for s in STEPS],
+            "projector_pose": [POSE.matrix()] * 2, "focal": [np.array([FOCAL])],
+        },
     )  # fmt: skip
 
 

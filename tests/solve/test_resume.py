@@ -174,7 +174,8 @@ def test_command_goes_on_from_a_folder(tmp_path: Path) -> None:
     first, second = (load_solution(tmp_path / name) for name in ("first", "second"))
     assert second.projector.focal.value == pytest.approx(first.projector.focal.value, rel=1e-4)
     assert "registration" not in second.timings
-    missing = run(*common, "--out", tmp_path / "third", "--resume", tmp_path)
+    (tmp_path / "empty").mkdir()
+    missing = run(*common, "--out", tmp_path / "third", "--resume", tmp_path / "empty")
     assert missing.exit_code == 2
     assert "state.npz" in missing.stderr
 
