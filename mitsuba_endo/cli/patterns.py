@@ -52,14 +52,17 @@ def patterns(
 
 
 def _command(plan: "StackPlan") -> str:
+    from ..decode.conventions import own_convention
+
     parts = [
         f"mitsuba-endo decode-stack FOLDER --pattern {plan.kind}",
         f"--width {plan.width} --height {plan.height}",
-        "" if plan.reference else "--no-reference",
+        f"--reference {'first' if plan.reference else 'none'}",
         "--inverse" if plan.inverse else "",
         f"--stripe {plan.stripe}" if plan.stripe else "",
         f"--periods {','.join(f'{p:g}' for p in plan.periods)}" if plan.periods else "",
         f"--steps {plan.steps}" if plan.steps else "",
+        f"--convention {','.join(own_convention(plan).words(plan))}",
         "--out map.exr",
     ]
     return " ".join(part for part in parts if part)

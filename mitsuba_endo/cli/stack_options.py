@@ -40,13 +40,20 @@ def make_plan(
 
     return StackPlan.make(
         kind, width, height, reference=reference, inverse=inverse, stripe=stripe,  # type: ignore[arg-type]
-        periods=None if periods is None else _numbers(periods), steps=steps,
+        periods=numbers(periods), steps=steps,
     )  # fmt: skip
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def numbers(text: str | None) -> tuple[float, ...] | None:
+    """Return the numbers of a list that are separated by commas.
+
+    Raises:
+        InputError: it holds other things.
+    """
     from ..errors import InputError
 
+    if text is None:
+        return None
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -131,8 +132,17 @@ def read_image(path: Path) -> NDArray[np.integer]:
     return pixels[..., None] if pixels.ndim == 2 else pixels[..., :3]
 
 
-def full_scale(*images: NDArray[np.integer]) -> int:
-    """Return the full scale of images of one kind: of 16 bit the least depth that holds them."""
-    brightest = max(int(image.max()) for image in images)
-    depths = DEPTHS[1:] if images[0].dtype == np.uint16 else DEPTHS
-    return 2 ** next(b for b in depths if brightest < 2**b) - 1
+def full_scale(image: NDArray[np.integer]) -> int:
+    """Return the full scale of an image: see :func:`depth_scale`."""
+    return depth_scale(int(image.max()), image.dtype)
+
+
+def depth_scale(brightest: int, kind: "np.dtype[Any]") -> int:
+    """Return the full scale of images of one kind: of 16 bits the least depth that holds them.
+
+    Args:
+        brightest: value of them all.
+        kind: 8 or 16 bits, unsigned.
+    """
+    depths = DEPTHS[1:] if kind == np.uint16 else DEPTHS
+    return 2 ** next(bits for bits in depths if brightest < 2**bits) - 1

@@ -3,10 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from itertools import product
+from typing import Any, Literal, get_args
 
 from ..errors import InputError
-from .gray_code import bit_count
+from .gray_code import Code, bit_count
+from .phase_shift import COSINE, PhaseConvention
 
 Kind = Literal["gray", "phase", "gray+phase"]
 Axis = Literal["x", "y"]
@@ -15,6 +17,10 @@ AXES: tuple[Axis, Axis] = ("x", "y")
 FINEST_PERIOD = 16.0
 MAX_RATIO = 6.0
 """Of neighbouring default periods: the coarser phase must tell which fringe the finer is in."""
+STRIPES = (1, 2, 4, 8, 16, 32)
+"""Narrowest stripes that are looked for, pattern pixels."""
+STEPS = range(3, 13)
+"""Phase steps per period that are looked for."""
 SPARE = 1.1
 """Coarsest default period over the pattern's longer side, so that noise cannot wrap it."""
 
@@ -25,8 +31,7 @@ class StackPlan:
 
     An axis has first its Gray bits from the coarsest to the finest, each followed by its inverse
     if there are inverses (the order of OpenCV's ``structured_light`` module), then for each
-    period, from the coarsest to the finest, its phase steps. Image k of a period shows
-    1/2 + 1/2 cos(2 pi q / period + 2 pi k / steps), at any contrast; a Gray bit 1 is white, and
+    period, from the coarsest to the finest, its phase steps, at any contrast. A bit 1 is white, and
     stripe 0 begins at the pattern's first pixel.
 
     Build one with :meth:`make`, which checks it and fills in what was not given.
@@ -46,6 +51,10 @@ class StackPlan:
     """Pattern pixels, coarsest first; empty without phase."""
     steps: int
     """Phase steps per period; 0 without phase."""
+    code: Code = "gray"
+    """Of the stripes."""
+    phase: PhaseConvention = COSINE
+    """What the phase images show."""
 
     @classmethod
     def make(
@@ -90,6 +99,12 @@ class StackPlan:
         return cls(kind, width, height, reference, inverse, stripe, periods, steps)
 
     @property
+    def usual(self) -> bool:
+        """Its stripe and its steps are those by default."""
+        usual = StackPlan.make(self.kind, self.width, self.height, periods=self.periods or None)
+        return (usual.stripe, usual.steps) == (self.stripe, self.steps)
+
+    @property
     def size(self) -> dict[Axis, int]:
         """Pattern pixels along each axis."""
         return {"x": self.width, "y": self.height}
@@ -103,17 +118,30 @@ class StackPlan:
 
         Gray bits count down to ``gray00``, the finest.
         """
-        head = ["white", "black"] if self.reference else []
-        return head + [label for axis in AXES for label in self._axis_labels(axis)]
+        return [*self.reference_labels(), *(label for a in AXES for label in self.axis_labels(a))]
 
-    def _axis_labels(self, axis: Axis) -> Iterator[str]:
-        for bit in reversed(range(self.bits(axis))):
-            yield f"{axis}_gray{bit:02d}"
-            if self.inverse:
-                yield f"{axis}_gray{bit:02d}_inverse"
-        for period in self.periods:
-            for step in range(self.steps):
-                yield f"{axis}_phase{period:g}_step{step}"
+    def reference_labels(self) -> list[str]:
+        """Return the labels of the white and the black image, if there are any."""
+        return ["white", "black"] if self.reference else []
+
+    def axis_labels(self, axis: Axis) -> list[str]:
+        """Return the labels of an axis's images."""
+        bits = self.bit_labels(axis)
+        inverses = self.inverse_labels(axis) if self.inverse else [None] * len(bits)
+        stripes = [label for pair in zip(bits, inverses, strict=True) for label in pair if label]
+        return stripes + [label for steps in self.phase_labels(axis) for label in steps]
+
+    def bit_labels(self, axis: Axis) -> list[str]:
+        """Return the labels of the bits' images, coarsest first."""
+        return [f"{axis}_gray{bit:02d}" for bit in reversed(range(self.bits(axis)))]
+
+    def inverse_labels(self, axis: Axis) -> list[str]:
+        """Return the labels of their inverses, likewise."""
+        return [f"{label}_inverse" for label in self.bit_labels(axis)]
+
+    def phase_labels(self, axis: Axis) -> list[list[str]]:
+        """Return the labels of the steps of each period, coarsest first."""
+        return [[f"{axis}_phase{p:g}_step{k}" for k in range(self.steps)] for p in self.periods]
 
 
 def _refuse_unused(kind: Kind, **given: object) -> None:
@@ -165,3 +193,87 @@ def _checked_stripe(kind: Kind, extent: int, periods: tuple[float, ...], stripe:
             "give at most half the period",
         )  # fmt: skip
     return stripe
+
+
+def possible_plans(
+    images: int,
+    width: int,
+    height: int,
+    *,
+    kind: Kind | None = None,
+    reference: bool | None = None,
+    inverse: bool | None = None,
+    stripe: int | None = None,
+    periods: tuple[float, ...] | None = None,
+    steps: int | None = None,
+) -> list[StackPlan]:
+    """Return the plans with this number of images, the commonest first.
+
+    Args:
+        images: of the stack.
+        width: of the pattern, pixels.
+        height: of the pattern, pixels.
+        kind: None: any; likewise of the others, see :meth:`StackPlan.make`.
+        reference: a white and a black image are among them.
+        inverse: each bit has its inverse.
+        stripe: narrowest stripe.
+        periods: of the phases, pattern pixels.
+        steps: per period.
+
+    Raises:
+        InputError: a value out of range, one that this kind of stack has no use for, or no plan
+            that fits it has so many images.
+    """
+    kinds: tuple[Kind, ...] = get_args(Kind) if kind is None else (kind,)
+    plans: list[StackPlan] = []
+    refusals: list[InputError] = []
+    for one in kinds:
+        try:
+            StackPlan.make(one, width, height, inverse=bool(inverse), stripe=stripe,
+                           periods=periods, steps=steps)  # fmt: skip
+        except InputError as refusal:
+            refusals.append(refusal)
+            continue
+        for choice in _choices(one, width, height, reference, inverse, stripe, periods, steps):
+            plan = StackPlan.make(one, width, height, **choice)
+            if plan not in plans:
+                plans.append(plan)
+    if len(refusals) == len(kinds):
+        raise refusals[0]
+    fitting = [plan for plan in plans if len(plan.labels()) == images]
+    if not fitting:
+        usual = [plan for plan in plans if plan.usual or (stripe or steps)]
+        counts = sorted({len(plan.labels()) for plan in usual})
+        one = f"this pattern has {counts[0]}"
+        several = f"such patterns have {', '.join(map(str, counts))}"
+        raise InputError(
+            f"{images} images, but {one if len(counts) == 1 else several}", "stack",
+            "check the pattern's size and its options against what was projected",
+        )  # fmt: skip
+    return fitting
+
+
+def _choices(
+    kind: Kind,
+    width: int,
+    height: int,
+    reference: bool | None,
+    inverse: bool | None,
+    stripe: int | None,
+    periods: tuple[float, ...] | None,
+    steps: int | None,
+) -> Iterator[dict[str, Any]]:
+    """Yield what may be given to :meth:`StackPlan.make`, with what is not known filled in."""
+    finest = periods[0] if periods else FINEST_PERIOD
+    widest = min(width, height) // 2 if kind == "gray" else finest / 2
+    wide = [w for w in STRIPES if w <= widest]
+    fill = {
+        "reference": (True, False) if reference is None else (reference,),
+        "inverse": ((False, True) if inverse is None else (inverse,)) if kind != "phase" else (),
+        "stripe": ([None, *wide] if stripe is None else [stripe]) if kind != "phase" else (),
+        "periods": (periods,) if kind != "gray" else (),
+        "steps": (([None, *STEPS]) if steps is None else [steps]) if kind != "gray" else (),
+    }
+    used = {name: values for name, values in fill.items() if values}
+    for values in product(*used.values()):
+        yield dict(zip(used, values, strict=True))

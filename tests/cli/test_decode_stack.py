@@ -113,7 +113,7 @@ def test_missing_image_without_names(projected: Path):
         path.rename(projected / f"IMG_{i}.png")
     assert _decode(projected, "--inverse").exit_code == 0  # IMG_10 comes after IMG_9
     (projected / "IMG_7.png").unlink()
-    _fail(_decode(projected, "--inverse"), 2, "25 images, but this pattern has 26")
+    _fail(_decode(projected, "--inverse"), 2, "25 images, but such patterns have 24, 26")
 
 
 def test_swapped_images(projected: Path):

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.gray_code import bit_images, decode_bits
+from mitsuba_endo.decode.gray_code import bit_images, read_stripes
 from mitsuba_endo.decode.phase_shift import phase_images, wrapped_coordinate
 from mitsuba_endo.decode.plan import StackPlan
-from mitsuba_endo.decode.stack import Stack, decode_stack, estimate_noise, patterns
+from mitsuba_endo.decode.stack import decode_stack
+from mitsuba_endo.decode.stack_images import Stack, estimate_noise
+from mitsuba_endo.decode.stack_patterns import patterns
 from mitsuba_endo.errors import InputError, NothingDecodedError
 from mitsuba_endo.start.search import search_start
 from tests.decode.captures import SIZE, View, inner, photograph, view
@@ -104,25 +106,41 @@ def test_shadowed_and_saturated_pixels_are_missing(scene: View):
 
 
 def test_bits_follow_the_textbook():
-    """Oracle: the table of the Gray code of 0 to 7; a pixel on an edge gets the edge."""
+    """Oracle: the table of the Gray code of 0 to 7; a pixel on an edge lies on either side."""
     expected = [[0, 0, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1, 0, 0], [0, 1, 1, 0, 0, 1, 1, 0]]
     np.testing.assert_array_equal(bit_images(8), expected)
-    signal = (2 * bit_images(8) - 1)[:, None]
-    np.testing.assert_array_equal(decode_bits(signal, 0.2, 8)[0], np.arange(8))
-    edge = signal.copy()
-    edge[1, 0, 1] = 0.1  # between stripes 1 and 2 this bit changes
-    assert decode_bits(edge, 0.2, 8)[0, 1] == 1.5
-    edge[2, 0, 1] = 0.1
-    assert np.isnan(decode_bits(edge, 0.2, 8)[0, 1])
-    assert np.isnan(decode_bits(signal, 0.2, 6)[0, 6:]).all()  # codes beyond the pattern
+    signal = 2 * bit_images(8) - 1
+    index, certain = read_stripes(signal, 0.2)
+    np.testing.assert_array_equal(index, np.arange(8))
+    assert certain.all()
+    for value, stripe in ((-0.1, 1), (0.1, 2)):
+        edge = signal.copy()
+        edge[1, 1] = value  # between stripes 1 and 2 this bit changes
+        index, certain = read_stripes(edge, 0.2)
+        assert index[1] == stripe
+        assert certain.all()
+    edge[2, 1] = 0.1
+    assert not read_stripes(edge, 0.2)[1][1]
+
+
+def test_binary_bits():
+    """Oracle: binary counting; at an edge where more than one bit changes, neither side is sure."""
+    np.testing.assert_array_equal(bit_images(4, 1, "binary"), [[0, 0, 1, 1], [0, 1, 0, 1]])
+    signal = 2 * bit_images(8, 1, "binary") - 1
+    index, certain = read_stripes(signal, 0.2, "binary")
+    np.testing.assert_array_equal(index, np.arange(8))
+    assert certain.all()
+    signal[:, 3] = [-0.1, 0.1, 0.1]
+    assert not read_stripes(signal, 0.2, "binary")[1][3]
 
 
 @pytest.mark.parametrize(("size", "stripe"), [(2, 1), (100, 1), (100, 8), (513, 4), (37, 3)])
 def test_bits_tell_all_stripes_apart(size: int, stripe: int):
     """Oracle: integer division; neighbours differ in at most one bit."""
     bits = bit_images(size, stripe)
-    found = decode_bits((2 * bits - 1)[:, None], 0.2, size, stripe)[0]
-    np.testing.assert_array_equal((found + 0.5) // stripe, np.arange(size) // stripe)
+    index, certain = read_stripes(2 * bits - 1, 0.2)
+    np.testing.assert_array_equal(index, np.arange(size) // stripe)
+    assert certain.all()
     assert np.abs(np.diff(bits, axis=1)).sum(0).max() == 1
 
 

@@ -1,0 +1,95 @@
+"""Which conventions of the phases fit the samples of a stack."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .axis_images import AxisImages
+from .conventions import Stated
+from .phase_shift import PhaseConvention, refine, unroll_coarsest, wrapped_coordinate
+from .plan import AXES, Axis, StackPlan
+from .stack_samples import StackSamples
+
+OFF_PHASE = 0.03
+"""Turns by which the mean phase may differ from a convention's."""
+OFF_COARSER = 0.05
+"""Turns by which the mean phase of a period may differ from what the coarser one says."""
+CONCENTRATED = 0.6
+"""Length of the mean of coarse minus fine phase on the circle: one, if all agree."""
+
+
+def phase_conventions(
+    samples: StackSamples,
+    plan: StackPlan,
+    place: dict[str, int],
+    coarse: Sequence[NDArray[np.float32]],
+    stated: Stated,
+) -> Iterator[PhaseConvention]:
+    """Yield what the phases may show: all conventions, or with a code those that fit it."""
+    for sign in (1, -1):
+        if not stated.allows("sign", sign):
+            continue
+        offsets = [o for o in usual_offsets(plan.steps, sign) if stated.allows("offset", o)]
+        wanted = [value for name, value in stated.parts if name == "offset"]
+        offsets += [float(str(value)) for value in wanted if value not in offsets]
+        if coarse:
+            measured = [
+                _offset(samples, plan, axis, place, coarse[k], sign) for k, axis in enumerate(AXES)
+            ]
+            offsets = [o for o in offsets if all(_near(o, m) for m in measured)][:1]
+        yield from (PhaseConvention(sign, offset) for offset in offsets)
+
+
+def usual_offsets(steps: int, sign: int) -> list[float]:
+    """Return the offsets, turns, of cosine and sine whose first shift is none, one, or centred."""
+    firsts = (0.0, 1.0, -(steps - 1) / 2)
+    offsets = [(base + sign * first / steps) % 1 for first in firsts
+               for base in (0.0, 0.75, 0.5, 0.25)]  # fmt: skip
+    return list(dict.fromkeys(round(offset, 9) % 1 for offset in offsets))
+
+
+def _near(offset: float, measured: float | None) -> bool:
+    if measured is None:
+        return False
+    return abs((offset - measured + 0.5) % 1 - 0.5) < OFF_PHASE
+
+
+def _offset(
+    samples: StackSamples,
+    plan: StackPlan,
+    axis: Axis,
+    place: dict[str, int],
+    coarse: NDArray[np.float32],
+    sign: int,
+) -> float | None:
+    """Return the phase less what the code says, turns; None if the samples do not agree."""
+    waves = samples.axis(plan, axis, place).waves[0]
+    share = wrapped_coordinate(waves, 1.0, PhaseConvention(sign))[0]
+    known = np.isfinite(coarse) & samples.lit
+    if not known.any():
+        return None
+    turn = np.exp(2j * np.pi * (share[known] - coarse[known] / plan.periods[0])).mean()
+    return float(np.angle(turn) / (2 * np.pi)) if abs(turn) >= CONCENTRATED else None
+
+
+def periods_agree(
+    images: AxisImages,
+    plan: StackPlan,
+    axis: Axis,
+    coarse: NDArray[np.float32] | None,
+    lit: NDArray[np.bool_],
+) -> bool:
+    """Tell whether each period's phase is, in the mean, that of the coarser coordinate."""
+    q = coarse
+    for period, waves in zip(plan.periods, images.waves, strict=True):
+        fine, _ = wrapped_coordinate(waves, period, plan.phase)
+        if q is None:
+            q = unroll_coarsest(fine, period, plan.size[axis])
+            continue
+        known = lit & np.isfinite(q)
+        turn = np.exp(2j * np.pi * (q - fine)[known] / period).mean() if known.any() else 0
+        if abs(turn) < CONCENTRATED or abs(np.angle(turn)) > 2 * np.pi * OFF_COARSER:
+            return False
+        q = refine(q, fine, period)
+    return True
