@@ -1,4 +1,4 @@
-"""A solution against the truth, from records and folders to one record of figures."""
+"""A solution against the truth, from records and folders to one record of metrics."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -8,7 +8,7 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import Frame, Solution
 from ..records.surface import load_surface
-from .figure import Figure, rms
+from .metric import Metric, rms
 from .metrics import FrameMetrics, Metrics
 from .poses import (
     baseline_error,
@@ -50,17 +50,17 @@ def evaluate(
             that cannot be read.
     """
     pairs, matched_by = match_frames(solution, truth)
-    metric = _metric(solution, truth)
-    figures = [_frame_figures(pairs[0], pair, solution, truth, metric) for pair in pairs]
+    no_unit = _without_unit(solution, truth)
+    metrics = [_metrics_of(pairs[0], pair, solution, truth, no_unit) for pair in pairs]
     names = [frame.name for frame, _ in pairs]
-    summary = {key: rms([f[key] for f in figures], names) for key in POSE_KEYS}
+    summary = {key: rms([f[key] for f in metrics], names) for key in POSE_KEYS}
     alignment = alignment or ("none" if solution.units == "mm" else "scale")
     shape = _shape(solution, truth, solution_dir, truth_dir, pairs[0], alignment)
-    reasons = {key: figure.reason for key, figure in summary.items() if figure.reason}
-    values: dict[str, Any] = {key: figure.value for key, figure in summary.items()}
+    reasons = {key: metric.reason for key, metric in summary.items() if metric.reason}
+    values: dict[str, Any] = {key: metric.value for key, metric in summary.items()}
     return Metrics(
         **values, **_shape_values(shape, alignment, reasons), matched_by=matched_by,
-        frames=[_frame_metrics(pair, f) for pair, f in zip(pairs, figures, strict=True)],
+        frames=[_frame_metrics(pair, f) for pair, f in zip(pairs, metrics, strict=True)],
         reasons=reasons,
     )  # fmt: skip
 
@@ -97,17 +97,17 @@ def match_frames(
     return list(zip(solution.frames, truth.frames, strict=True)), "order"
 
 
-def _metric(solution: Solution, truth: Solution) -> Figure | None:
-    """Return an unknown figure with the reason where lengths cannot be compared, else None."""
+def _without_unit(solution: Solution, truth: Solution) -> Metric | None:
+    """Return an unknown metric with the reason where lengths cannot be compared, else None."""
     for side, record in (("solution", solution), ("truth", truth)):
         if record.units != "mm":
-            return Figure.unknown(f"the {side} is up to scale")
+            return Metric.unknown(f"the {side} is up to scale")
     return None
 
 
-def _frame_figures(
-    first: Pair, pair: Pair, solution: Solution, truth: Solution, metric: Figure | None
-) -> dict[str, Figure]:
+def _metrics_of(
+    first: Pair, pair: Pair, solution: Solution, truth: Solution, no_unit: Metric | None
+) -> dict[str, Metric]:
     found, true = pair
     poses = found.projector_from_camera, true.projector_from_camera
     turned, moved = camera_errors(
@@ -120,14 +120,14 @@ def _frame_figures(
         ),
         "rotation_error_deg": rotation_error(*poses),
         "translation_direction_error_deg": translation_direction_error(*poses),
-        "baseline_error_percent": metric or baseline_error(*poses),
+        "baseline_error_percent": no_unit or baseline_error(*poses),
         "camera_rotation_error_deg": turned,
-        "camera_translation_error_mm": metric or moved,
+        "camera_translation_error_mm": no_unit or moved,
     }
 
 
-def _frame_metrics(pair: Pair, figures: dict[str, Figure]) -> FrameMetrics:
-    values: dict[str, Any] = {key: figure.value for key, figure in figures.items()}
+def _frame_metrics(pair: Pair, metrics: dict[str, Metric]) -> FrameMetrics:
+    values: dict[str, Any] = {key: metric.value for key, metric in metrics.items()}
     return FrameMetrics(name=pair[0].name, truth=pair[1].name, **values)
 
 

@@ -114,7 +114,7 @@ class Focal(Record):
         return self
 
 
-class Pose(Record):
+class GivenPose(Record):
     """Rigid transform X_projector = R X_camera + t; R is 3x3 or a rotation vector (radians)."""
 
     R: Matrix3 | Vector3
@@ -164,7 +164,7 @@ class Projector(Record):
     grid_period: Length | None = None
     """Period of the pattern's grid, pattern pixels: lets slips of the decoder by whole periods be
     told from other errors."""
-    pose: Pose | None = None
+    pose: GivenPose | None = None
     """Start for projector_from_camera, mm."""
 
     @field_validator("law")

@@ -17,7 +17,7 @@ from .untyped import mi
 
 
 @dataclass(frozen=True, eq=False)
-class Correspondences:
+class ExactView:
     """What an ideal decoder would find."""
 
     q: NDArray[np.float64]
@@ -71,7 +71,7 @@ class MeshScene:
         projector: ProjectorModel,
         projector_from_camera: RigidTransform,
         size: tuple[int, int] | None = None,
-    ) -> Correspondences:
+    ) -> ExactView:
         """Return the correspondences of one frame.
 
         Args:
@@ -91,7 +91,7 @@ class MeshScene:
         if size is not None:
             lit &= ((q >= -0.5) & (q <= np.array(size) - 0.5)).all(1)
         shape = (camera.height, camera.width)
-        return Correspondences(
+        return ExactView(
             np.where(lit[:, None], q, np.nan).reshape(*shape, 2),
             np.where(hit[:, None], at, np.nan).reshape(*shape, 3),
         )

@@ -17,8 +17,8 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, FrameMaps, TraceRow
 from ..records.solution import Solution
 from . import panels
-from .numbers import headline, unit_name
-from .places import places
+from .frame_poses import frame_poses
+from .solution_values import headline, unit_name
 from .view import SurfaceView
 
 DPI = 110
@@ -193,7 +193,7 @@ def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
 
 def projector_poses(solution: Solution) -> list[RigidTransform]:
     """Return every known projector's pose in the first camera's frame."""
-    found = [place.first_from_projector for place in places(solution)]
+    found = [at.first_from_projector for at in frame_poses(solution)]
     return [pose for pose in found if pose is not None]
 
 

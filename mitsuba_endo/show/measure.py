@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import Solution
-from .numbers import interval
+from .solution_values import interval
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..files import atomic_path
 from ..records.calibration import Calibration
 from . import report_sections as sections
-from .content import Content
+from .result_scene import ResultScene
 from .truth import load_truth
 from .view import SurfaceView, view_surface
 
@@ -33,24 +33,24 @@ def save_report(
         InputError: the file cannot be written, or a truth is not that of its result.
     """
     views = views or [view_surface(c.surface, c.camera) for _, c in results]
-    contents = [Content(calibration) for _, calibration in results]
-    for content, truth in zip(contents, truths, strict=False):
+    scenes = [ResultScene(calibration) for _, calibration in results]
+    for scene, truth in zip(scenes, truths, strict=False):
         if truth is not None:
-            content.truth = load_truth(truth, content.calibration)
-    page = _page([name for name, _ in results], contents, views)
+            scene.truth = load_truth(truth, scene.calibration)
+    page = _page([name for name, _ in results], scenes, views)
     with atomic_path(path) as aside:
         aside.write_text(page, encoding="utf-8")
 
 
-def _page(names: list[str], contents: list[Content], views: Sequence[SurfaceView]) -> str:
-    several = len(contents) > 1
+def _page(names: list[str], scenes: list[ResultScene], views: Sequence[SurfaceView]) -> str:
+    several = len(scenes) > 1
     compared = ""
     if several:
-        table = sections.comparison(names, [c.calibration.solution for c in contents])
+        table = sections.comparison(names, [c.calibration.solution for c in scenes])
         compared = f"<h3>Compared, with 95 % intervals</h3>{table}<p></p>"
     articles = "".join(
-        _article(i, name, content, view)
-        for i, (name, content, view) in enumerate(zip(names, contents, views, strict=True))
+        _article(i, name, scene, view)
+        for i, (name, scene, view) in enumerate(zip(names, scenes, views, strict=True))
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -66,12 +66,12 @@ def _page(names: list[str], contents: list[Content], views: Sequence[SurfaceView
     )
 
 
-def _article(number: int, name: str, content: Content, view: SurfaceView) -> str:
-    calibration, solution = content.calibration, content.calibration.solution
+def _article(number: int, name: str, scene: ResultScene, view: SurfaceView) -> str:
+    calibration, solution = scene.calibration, scene.calibration.solution
     return (
         f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
         f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
-        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(content, view, number)}"
+        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(scene, view, number)}"
         f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"
     )
 

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from ..records.calibration import Calibration
 from ..records.solution import Outcome, Solution
 from . import figures
-from .content import Content
-from .numbers import Row, rows
+from .result_scene import ResultScene
+from .solution_values import Row, rows
 from .view import SurfaceView, view_surface
-from .web_images import MapImages, MapPages, Scale, figure_image, figure_svg, map_pages
+from .web_images import ColourBar, MapImages, MapPages, figure_image, figure_svg, map_pages
 from .web_scene import scene_canvas, view_error
 
 _CHART_INCHES = 5.2
@@ -144,25 +144,25 @@ def _panels(images: MapImages, pages: MapPages, frame: int, coordinate: int, nam
     )
 
 
-def _bar(scale: Scale) -> str:
+def _bar(scale: ColourBar) -> str:
     return (
         f'<div class="bar"><span>{_minus(scale.low)}</span><img alt="" src="{scale.image}">'
         f"<span>{_minus(scale.high)}</span></div><figcaption>{escape(scale.note)}</figcaption>"
     )
 
 
-def charts(content: Content, view: SurfaceView, number: int) -> str:
+def charts(scene: ResultScene, view: SurfaceView, number: int) -> str:
     """Return surface, residual distribution, rig and convergence."""
-    calibration = content.calibration
+    calibration = scene.calibration
     solution, trace = calibration.solution, calibration.trace
     scale = trace[-1].scale_px if trace else None
-    known_truth = content.truth is not None and content.truth.surface is not None
-    error = view_error(content, 0, view) if known_truth else None
+    known_truth = scene.truth is not None and scene.truth.surface is not None
+    error = view_error(scene, 0, view) if known_truth else None
     surface = "".join(
         f'<img alt="{figure.axes[0].get_title()}" src="{figure_image(figure)}">'
-        for figure in figures.surface_figures(view, content.unit, error)
+        for figure in figures.surface_figures(view, scene.unit, error)
     )
-    views = [view, *(view_surface(s, calibration.camera) for s in content.surfaces[1:])]
+    views = [view, *(view_surface(s, calibration.camera) for s in scene.surfaces[1:])]
     drawn = [
         ("residual distribution", figures.histogram_figure(
             calibration.frames, solution.noise_px, scale
@@ -179,7 +179,7 @@ def charts(content: Content, view: SurfaceView, number: int) -> str:
     images = "".join(_chart(alt, figure) for alt, figure in drawn)
     return (
         f'<h3>Surface</h3><div class="surfaces">{surface}</div>'
-        f"<h3>Surface and rig in space</h3><figure>{scene_canvas(content, views, number)}</figure>"
+        f"<h3>Surface and rig in space</h3><figure>{scene_canvas(scene, views, number)}</figure>"
         f'<h3>Residuals, rig and convergence</h3><div class="charts">{images}</div>'
     )
 

@@ -14,7 +14,7 @@ from ..reading.regular import is_file
 from ..records.calibration import Calibration, SurfaceEstimate
 from ..records.solution import Solution, load_solution
 from ..records.surface import load_surface
-from .places import Floats, Place, places
+from .frame_poses import Floats, FramePoses, frame_poses
 
 NAMES = ("truth.json", "../truth.json", "../capture/truth.json")
 """Where a truth may lie, from the result's folder."""
@@ -25,7 +25,7 @@ class Truth:
     """A truth in the solution's unit."""
 
     path: Path
-    places: list[Place]
+    poses: list[FramePoses]
     """Of the solution's frames, in the true frame of the solution's first camera."""
     surface: SurfaceEstimate | None
     """In that frame."""
@@ -88,7 +88,7 @@ def load_truth(path: str | Path, calibration: Calibration) -> Truth:
     factor = _factor(calibration, surface, alignment)
     if surface is not None:
         surface = SurfaceEstimate(factor * surface.vertices, surface.faces)
-    return Truth(path, [_scaled(p, factor) for p in places(same)], surface, alignment)
+    return Truth(path, [_scaled(p, factor) for p in frame_poses(same)], surface, alignment)
 
 
 def _factor(
@@ -106,12 +106,12 @@ def _factor(
     return 1 / found.scale
 
 
-def _scaled(place: Place, factor: float) -> Place:
-    return Place(
-        place.name,
+def _scaled(at: FramePoses, factor: float) -> FramePoses:
+    return FramePoses(
+        at.name,
         *(
             None if p is None else RigidTransform(p.R, factor * p.t)
-            for p in (place.first_from_camera, place.first_from_projector)
+            for p in (at.first_from_camera, at.first_from_projector)
         ),
     )
 

@@ -26,7 +26,7 @@ _FIGURE_DPI = 96
 
 
 @dataclass(frozen=True)
-class Scale:
+class ColourBar:
     """A colour bar."""
 
     image: str
@@ -50,8 +50,8 @@ class MapPages:
     """Images of all frames; the two coordinates, x and y, are the inner lists."""
 
     images: list[list[MapImages]]
-    coordinate_scales: list[Scale]
-    residual_scale: Scale
+    coordinate_scales: list[ColourBar]
+    residual_scale: ColourBar
 
 
 def map_pages(frames: Sequence[FrameMaps]) -> MapPages:
@@ -111,10 +111,10 @@ def _residual(frame: FrameMaps, channel: int, limit: float) -> NDArray[np.float6
     return image
 
 
-def _scale(colours: Any, norm: Normalize, note: str) -> Scale:
+def _scale(colours: Any, norm: Normalize, note: str) -> ColourBar:
     low, high = float(norm.vmin or 0), float(norm.vmax or 0)
     strip = colours(np.linspace(0, 1, 360, endpoint=False))[None, :, :3]
-    return Scale(_uri(strip, 1.0, lossless=True), f"{low:.3g}", f"{high:.3g}", note)
+    return ColourBar(_uri(strip, 1.0, lossless=True), f"{low:.3g}", f"{high:.3g}", note)
 
 
 def _uri(rgb: NDArray[np.float64], shrink: float, lossless: bool = False) -> str:

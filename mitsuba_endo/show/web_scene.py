@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from . import surface_colours
 from .colours import CAMERA, PROJECTOR, shaded
-from .content import Content, seen_from
-from .places import Floats, Place, camera_corners, pyramid, solution_corners
+from .frame_poses import Floats, FramePoses, camera_corners, pyramid, solution_corners
+from .result_scene import ResultScene, seen_from
 from .surface_colours import Shown
 from .view import SurfaceView, range_of
 
@@ -24,14 +24,14 @@ _STEEPEST = 12.0
 """Slope against the image, beyond which neighbouring pixels see two surfaces and not one."""
 
 
-def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) -> str:
+def scene_canvas(scene: ResultScene, views: list[SurfaceView], number: int = 0) -> str:
     """Return a canvas, with its controls, that report.js turns into a view to be turned.
 
     Drawn is what the cameras see of their surfaces: points in the first camera's frame, and
     quadrilaterals (Q, 4) of points that are neighbours in the image.
 
     Args:
-        content: the result.
+        scene: the result.
         views: of every surface in its camera.
         number: of the result on its page.
     """
@@ -40,10 +40,10 @@ def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) ->
     room = _POINTS if len(views) == 1 else 2 * _POINTS // len(views)
     steps = [_step(view, room) for view in views]
     kept = [_thinned(*args) for args in zip(views, steps, strict=True)]
-    quantities = _quantities(content, views, kept)
+    quantities = _quantities(scene, views, kept)
     data = {
         "surfaces": [
-            _surface(content, *args) for args in zip(range(len(views)), views, steps, strict=True)
+            _surface(scene, *args) for args in zip(range(len(views)), views, steps, strict=True)
         ],
         "colours": [
             [
@@ -52,17 +52,17 @@ def scene_canvas(content: Content, views: list[SurfaceView], number: int = 0) ->
             ]
             for q in quantities
         ],
-        "lines": _lines(content),
+        "lines": _lines(scene),
     }
-    frames = [place.name for place in content.places]
+    frames = [at.name for at in scene.poses]
     return (
         f'<div class="space" data-scene="{escape(json.dumps(data))}" '
         f'data-frames="{escape(json.dumps(frames))}">'
-        f"{_controls(content, quantities, number)}"
+        f"{_controls(scene, quantities, number)}"
         '<canvas class="scene"></canvas>'
         + "".join(f'<div class="legend"{" hidden" * (i > 0)}>{q.legend()}</div>'
                   for i, q in enumerate(quantities))
-        + f"<figcaption>{_caption(content)}</figcaption></div>"
+        + f"<figcaption>{_caption(scene)}</figcaption></div>"
     )  # fmt: skip
 
 
@@ -78,8 +78,8 @@ def _thinned(view: SurfaceView, step: int) -> NDArray[np.bool_]:
     return kept & np.isfinite(view.depth)
 
 
-def _surface(content: Content, index: int, view: SurfaceView, step: int) -> dict[str, str]:
-    points = content.first_from_surface(index).apply(view.points[_thinned(view, step)])
+def _surface(scene: ResultScene, index: int, view: SurfaceView, step: int) -> dict[str, str]:
+    points = scene.first_from_surface(index).apply(view.points[_thinned(view, step)])
     quads = _quads(view.points[::step, ::step])
     return {"points": _base64(points.astype("<f4")), "quads": _base64(quads.astype("<u2"))}
 
@@ -102,26 +102,26 @@ def _quads(points: Floats) -> NDArray[np.int64]:
 
 
 def _quantities(
-    content: Content, views: list[SurfaceView], kept: list[NDArray[np.bool_]]
+    scene: ResultScene, views: list[SurfaceView], kept: list[NDArray[np.bool_]]
 ) -> list[Shown]:
     """Return what the points can be coloured by: of uncertainty, error, and else depth."""
     pairs = list(zip(views, kept, strict=True))
     out = []
     if all(view.std is not None for view in views):
         stds = [view.std[k] for view, k in pairs if view.std is not None]
-        out.append(surface_colours.uncertainty(stds, content.unit))
-    truth = content.truth
+        out.append(surface_colours.uncertainty(stds, scene.unit))
+    truth = scene.truth
     if truth is not None and truth.surface is not None:
-        errors = [view_error(content, s, view)[k] for s, (view, k) in enumerate(pairs)]
-        out.append(surface_colours.error(errors, content.unit, truth.alignment))
-    return out or [surface_colours.depth([view.points[k] for view, k in pairs], content.unit)]
+        errors = [view_error(scene, s, view)[k] for s, (view, k) in enumerate(pairs)]
+        out.append(surface_colours.error(errors, scene.unit, truth.alignment))
+    return out or [surface_colours.depth([view.points[k] for view, k in pairs], scene.unit)]
 
 
-def view_error(content: Content, surface: int, view: SurfaceView) -> Floats:
+def view_error(scene: ResultScene, surface: int, view: SurfaceView) -> Floats:
     """Return found minus true range (H, W) along a camera's rays, NaN = unknown."""
-    truth = content.truth
+    truth = scene.truth
     assert truth is not None
-    true = range_of(seen_from(truth, surface), content.calibration.camera)
+    true = range_of(seen_from(truth, surface), scene.calibration.camera)
     return np.linalg.norm(view.points, axis=-1) - true
 
 
@@ -133,32 +133,32 @@ def _painted(
     return np.round(255 * rgba[:, :3]).astype(np.uint8)
 
 
-def _lines(content: Content) -> list[dict[str, Any]]:
+def _lines(scene: ResultScene) -> list[dict[str, Any]]:
     """Return frusta and rays: colour, kind, frame and segments."""
     out = []
-    truth = content.truth
-    for k, place in enumerate(content.places):
-        out += _frusta(content, k, place, "frusta", (CAMERA, PROJECTOR))
-        rays = content.rays(k)
+    truth = scene.truth
+    for k, at in enumerate(scene.poses):
+        out += _frusta(scene, k, at, "frusta", (CAMERA, PROJECTOR))
+        rays = scene.rays(k)
         if rays is not None:
             out.append(_line(CAMERA, "rays", k, rays.camera))
             out.append(_line(PROJECTOR, "rays", k, rays.projector))
         if truth is not None:
-            out += _frusta(content, k, truth.places[k], "truth", (_TRUTH, _TRUTH))
+            out += _frusta(scene, k, truth.poses[k], "truth", (_TRUTH, _TRUTH))
     return out
 
 
 def _frusta(
-    content: Content, frame: int, place: Place, kind: str, colours: tuple[str, str]
+    scene: ResultScene, frame: int, at: FramePoses, kind: str, colours: tuple[str, str]
 ) -> list[dict[str, Any]]:
-    solution = content.calibration.solution
+    solution = scene.calibration.solution
     corners = (
-        camera_corners(content.calibration.camera),
+        camera_corners(scene.calibration.camera),
         solution_corners(solution, solution.frames[frame]),
     )
-    poses = (place.first_from_camera, place.first_from_projector)
+    poses = (at.first_from_camera, at.first_from_projector)
     return [
-        _line(colour, kind, frame, pyramid(pose, directions, content.reach))
+        _line(colour, kind, frame, pyramid(pose, directions, scene.reach))
         for colour, pose, directions in zip(colours, poses, corners, strict=True)
         if pose is not None
     ]
@@ -169,11 +169,11 @@ def _line(colour: str, kind: str, frame: int, segments: Floats) -> dict[str, Any
     return {"colour": colour, "kind": kind, "frame": frame, "segments": rounded}
 
 
-def _controls(content: Content, quantities: list[Shown], number: int) -> str:
+def _controls(scene: ResultScene, quantities: list[Shown], number: int) -> str:
     out = ""
-    frames = len(content.places)
+    frames = len(scene.poses)
     if frames > 1:
-        least = 1 if len(content.surfaces) > 1 else 0
+        least = 1 if len(scene.surfaces) > 1 else 0
         out += (
             f'<label>Frame <input type="range" name="shown" min="{least}" max="{frames}" '
             f'value="{least}" step="1"></label><output></output>'
@@ -185,7 +185,7 @@ def _controls(content: Content, quantities: list[Shown], number: int) -> str:
             for i, q in enumerate(quantities)
         )
     boxes = [("frusta", True), ("rays", False)]
-    if content.truth is not None:
+    if scene.truth is not None:
         boxes.append(("truth", False))
     out += "".join(
         f'<label><input type="checkbox" name="{name}"{" checked" * on}> {name}</label>'
@@ -194,11 +194,11 @@ def _controls(content: Content, quantities: list[Shown], number: int) -> str:
     return f'<div class="controls">{out}</div>'
 
 
-def _caption(content: Content) -> str:
-    truth = "; dark: their true places" if content.truth is not None else ""
+def _caption(scene: ResultScene) -> str:
+    truth = "; dark: their true places" if scene.truth is not None else ""
     return (
         f"Blue: camera; orange: projector{truth}. Rays: some correspondences, up to where both rays"
-        f" of each pass most closely. Lengths in {content.unit}. Drag to turn, wheel to zoom, "
+        f" of each pass most closely. Lengths in {scene.unit}. Drag to turn, wheel to zoom, "
         "double click to reset."
     )
 

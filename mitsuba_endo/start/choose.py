@@ -10,7 +10,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
 
 from .correspondences import Correspondences
 from .propose import facing, planar_poses, same_pose
-from .refine import Loss, State, evaluate, minimise
+from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
 from .result import Candidate
 from .vectors import Vectors
 
@@ -33,7 +33,7 @@ SIMILAR_COST = 1.2
 
 
 @dataclass(frozen=True)
-class Problem:
+class RefinementProblem:
     """What stays the same over all candidates."""
 
     projector: ProjectorModel
@@ -47,7 +47,7 @@ class Problem:
 class Minimum:
     """A calibration at a minimum of the cost on some sample."""
 
-    state: State
+    state: EpipolarState
     in_front: float
     """Share of points not behind camera or projector."""
     cost: float = np.inf
@@ -64,13 +64,15 @@ class Minimum:
         return _same(self.state, other.state)
 
 
-def robust_scale(state: State) -> float:
+def robust_scale(state: EpipolarState) -> float:
     """Return 1.4826 times the median absolute residual, pattern pixels."""
     return max(MIN_SCALE_PX, 1.4826 * float(np.median(np.abs(state.r))))
 
 
 def refine(
-    problem: Problem, starts: Iterable[tuple[RigidTransform, float]], data: Correspondences
+    problem: RefinementProblem,
+    starts: Iterable[tuple[RigidTransform, float]],
+    data: Correspondences,
 ) -> list[Minimum]:
     """Descend from every (pose, focal) under the graduated and then the redescending loss.
 
@@ -92,7 +94,7 @@ def refine(
 
 
 def finish(
-    problem: Problem, minima: list[Minimum], data: Correspondences, more: Correspondences
+    problem: RefinementProblem, minima: list[Minimum], data: Correspondences, more: Correspondences
 ) -> list[Minimum]:
     """Finish the best minimum, and those of similar cost, on a larger sample.
 
@@ -120,16 +122,16 @@ def _close(minima: list[Minimum]) -> tuple[list[Minimum], list[Minimum]]:
 
 
 def _graduated(
-    problem: Problem,
-    states: list[State],
+    problem: RefinementProblem,
+    states: list[EpipolarState],
     data: Correspondences,
     scales: tuple[float, ...],
-    rival: State | None = None,
-) -> list[State]:
+    rival: EpipolarState | None = None,
+) -> list[EpipolarState]:
     """Descend from all states through the Cauchy scales; merge and drop between the scales."""
     rivals = [] if rival is None else [rival]
     for scale in scales:
-        loss = Loss(False, scale)
+        loss = EpipolarLoss(False, scale)
         states = [_descend(problem, s, data, loss) for s in states]
         states = _without_repeats(sorted(states, key=lambda s: loss.cost(s.r)))
         states = _competitive(problem, states, [*states, *rivals], loss)
@@ -137,8 +139,11 @@ def _graduated(
 
 
 def _competitive(
-    problem: Problem, states: list[State], field: list[State], loss: Loss
-) -> list[State]:
+    problem: RefinementProblem,
+    states: list[EpipolarState],
+    field: list[EpipolarState],
+    loss: EpipolarLoss,
+) -> list[EpipolarState]:
     """Drop hopeless states, but only once some state of ``field`` explains the data to the noise.
 
     Until then a high cost may just mean a long way to go.
@@ -150,7 +155,7 @@ def _competitive(
     return [s for s in states if costs[id(s)] <= HOPELESS * costs[id(best)]]
 
 
-def _twins(best: State, data: Correspondences) -> list[State]:
+def _twins(best: EpipolarState, data: Correspondences) -> list[EpipolarState]:
     noise_angle = robust_scale(best) / best.projector.focal
     poses = [
         facing(pose, data, best.seen, noise_angle)[0]
@@ -163,13 +168,13 @@ def _twins(best: State, data: Correspondences) -> list[State]:
     ]
 
 
-def _valid(states: list[State], data: Correspondences) -> list[Minimum]:
+def _valid(states: list[EpipolarState], data: Correspondences) -> list[Minimum]:
     minima = [_turned_to_front(s, data) for s in states]
     return ranked([m for m in minima if m.in_front >= MIN_IN_FRONT])
 
 
-def _without_repeats(states: list[State]) -> list[State]:
-    kept: list[State] = []
+def _without_repeats(states: list[EpipolarState]) -> list[EpipolarState]:
+    kept: list[EpipolarState] = []
     for s in states:
         if not any(_same(s, k) for k in kept):
             kept.append(s)
@@ -185,7 +190,7 @@ def ranked(minima: list[Minimum]) -> list[Minimum]:
     if not minima:
         return []
     scale = min(robust_scale(m.state) for m in minima)
-    loss = Loss(True, REDESCENDING * scale)
+    loss = EpipolarLoss(True, REDESCENDING * scale)
     rated = sorted(
         (Minimum(m.state, m.in_front, loss.cost(m.state.r) / scale**2) for m in minima),
         key=lambda m: m.cost,
@@ -205,7 +210,7 @@ def ranked(minima: list[Minimum]) -> list[Minimum]:
     )  # fmt: skip
 
 
-def cost_margin(a: Vectors, b: Vectors, loss: Loss, errors: float = 3.0) -> float:
+def cost_margin(a: Vectors, b: Vectors, loss: EpipolarLoss, errors: float = 3.0) -> float:
     """Return the difference of mean loss that noise alone makes between two calibrations.
 
     Each feels the noise across its own epipolar lines, so even two exact poses differ by the
@@ -223,8 +228,12 @@ def cost_margin(a: Vectors, b: Vectors, loss: Loss, errors: float = 3.0) -> floa
 
 
 def _descend(
-    problem: Problem, state: State, data: Correspondences, loss: Loss, iterations: int = 20
-) -> State:
+    problem: RefinementProblem,
+    state: EpipolarState,
+    data: Correspondences,
+    loss: EpipolarLoss,
+    iterations: int = 20,
+) -> EpipolarState:
     return minimise(
         state, data, loss, refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds,
         iterations=iterations,
@@ -232,22 +241,22 @@ def _descend(
 
 
 def _redescend(
-    problem: Problem, state: State, data: Correspondences, iterations: int = 20
-) -> State:
+    problem: RefinementProblem, state: EpipolarState, data: Correspondences, iterations: int = 20
+) -> EpipolarState:
     """Alternate the residual scale and the minimum under it until the scale stays."""
     for _ in range(4):
         scale = robust_scale(state)
-        state = _descend(problem, state, data, Loss(True, REDESCENDING * scale), iterations)
+        state = _descend(problem, state, data, EpipolarLoss(True, REDESCENDING * scale), iterations)
         if abs(robust_scale(state) - scale) < 0.02 * scale:
             break
     return state
 
 
-def _on(state: State, data: Correspondences) -> State:
+def _on(state: EpipolarState, data: Correspondences) -> EpipolarState:
     return evaluate(state.pose, state.projector, data)
 
 
-def _turned_to_front(state: State, data: Correspondences) -> Minimum:
+def _turned_to_front(state: EpipolarState, data: Correspondences) -> Minimum:
     """Return the minimum with the sign of t, which the residual does not feel, set by depth."""
     scale = robust_scale(state)
     near = np.abs(state.r) < 5 * scale
@@ -257,7 +266,7 @@ def _turned_to_front(state: State, data: Correspondences) -> Minimum:
     return Minimum(evaluate(pose, state.projector, data, state.seen), front)
 
 
-def _same(a: State, b: State) -> bool:
+def _same(a: EpipolarState, b: EpipolarState) -> bool:
     return (
         same_pose(a.pose, b.pose, 0.01)
         and abs(np.log(a.projector.focal / b.projector.focal)) < 0.02

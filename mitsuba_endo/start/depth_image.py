@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .choose import robust_scale
 from .correspondences import Correspondences
-from .refine import State
+from .refine import EpipolarState
 from .triangulate import ranges
 
 KEEP = 5.0
@@ -29,7 +29,7 @@ class DepthImage:
         return np.isfinite(self.depth)
 
 
-def depth_image(state: State, data: Correspondences, shape: tuple[int, int]) -> DepthImage:
+def depth_image(state: EpipolarState, data: Correspondences, shape: tuple[int, int]) -> DepthImage:
     """Triangulate correspondences.
 
     Args:

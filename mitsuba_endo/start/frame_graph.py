@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from .pairs import refine_pair, register_pair
-from .placement import FLAT, Pair, judge
-from .range_image import Frame
+from .range_image import RangePyramid
+from .registration_quality import FLAT, PairRegistration, judge
 from .similarity import Similarities
 
 MAX_ATTEMPTS = 4
@@ -22,12 +22,12 @@ LOOP = "contradicts the other frames around a loop"
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class ChainedFrame:
     """A frame reached from a root frame along trusted placements."""
 
     root_from_frame: Similarities
     """One transform, in the common unit."""
-    last: Pair
+    last: PairRegistration
     """The placement used last on the way."""
     parent: int
     """The frame before it on the way."""
@@ -37,12 +37,12 @@ class FrameGraph:
     """Frames as nodes and trusted placements as edges; grows by :meth:`connect`."""
 
     def __init__(
-        self, frames: list[Frame], rng: np.random.Generator, say: Callable[[str], None]
+        self, frames: list[RangePyramid], rng: np.random.Generator, say: Callable[[str], None]
     ) -> None:
         self.frames = frames
         self._rng = rng
         self._say = say
-        self._pairs: dict[tuple[int, int], Pair] = {}
+        self._pairs: dict[tuple[int, int], PairRegistration] = {}
         """Every placement tried, by (target, source) with target < source."""
         self._faults: dict[tuple[int, int], str] = {}
         """Why a placement is not trusted, empty if it is."""
@@ -87,11 +87,11 @@ class FrameGraph:
         usable = [k for k, frame in enumerate(self.frames) if frame.usable]
         return self.group_of(max(usable, key=lambda k: len(self.group_of(k))))
 
-    def placements(self, root: int) -> dict[int, Placed]:
+    def placements(self, root: int) -> dict[int, ChainedFrame]:
         """Return where the frames joined to ``root`` are, itself included."""
         return self._walk(root)
 
-    def attempts(self, k: int, group: list[int]) -> dict[int, Pair]:
+    def attempts(self, k: int, group: list[int]) -> dict[int, PairRegistration]:
         """Return the placements of frame ``k`` that were tried in the frames of ``group``."""
         return {
             j: self._placement(j, k)
@@ -152,7 +152,7 @@ class FrameGraph:
         shift = np.linalg.norm(found.t - guess.t)
         return bool(found.angle_to(guess)[0] < SAME_TURN and shift < SAME_SHIFT)
 
-    def _placement(self, j: int, k: int) -> Pair:
+    def _placement(self, j: int, k: int) -> PairRegistration:
         """Return the placement of frame ``k`` in frame ``j``."""
         return self._pairs[j, k] if j < k else self._pairs[k, j].inverse()
 
@@ -162,16 +162,16 @@ class FrameGraph:
         edges.sort(key=lambda e: -self._pairs[e].runner_up)
         return [a if b == j else b for a, b in edges]
 
-    def _walk(self, root: int) -> dict[int, Placed]:
+    def _walk(self, root: int) -> dict[int, ChainedFrame]:
         """Visit the frames joined to ``root``, breadth first, and chain their placements."""
-        reached = {root: Placed(Similarities.identity(), Pair(), root)}
+        reached = {root: ChainedFrame(Similarities.identity(), PairRegistration(), root)}
         queue = [root]
         for j in queue:
             for k in self._neighbours(j):
                 if k not in reached:
                     pair = self._placement(j, k)
                     chained = reached[j].root_from_frame @ pair.target_from_source
-                    reached[k] = Placed(chained, pair, j)
+                    reached[k] = ChainedFrame(chained, pair, j)
                     queue.append(k)
         return reached
 

@@ -17,11 +17,11 @@ from scipy.optimize import minimize_scalar
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import ProjectorModel
 
-from .choose import MIN_SCALE_PX, REDESCENDING, Problem, refine, robust_scale
+from .choose import MIN_SCALE_PX, REDESCENDING, RefinementProblem, refine, robust_scale
 from .clean import clean_map, noise_scale
 from .correspondences import Correspondences, checked_map, gather, spread_sample
 from .propose import distinct, focal_lengths, propose
-from .refine import Loss, State, evaluate, minimise
+from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
 
 PROPOSE_POINTS, REFINE_POINTS = 500, 1500
 HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
@@ -40,7 +40,7 @@ _PATIENT = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class FrameSamples:
     """Samples of one frame's correspondences."""
 
     few: Correspondences
@@ -48,7 +48,7 @@ class Frame:
     some: Correspondences
     """To refine them on."""
     noise_px: float
-    """See :class:`.choose.Problem`."""
+    """See :class:`.choose.RefinementProblem`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class LensShift:
     """Robust scale of the residuals at the best centre, pattern pixels; the worst frame's."""
     middle_scale_px: float
     """The same at the middle; infinite where no pose is possible there."""
-    states: list[State]
+    states: list[EpipolarState]
     """The calibration of every frame at ``centre``; empty where none is possible."""
 
     @property
@@ -86,7 +86,9 @@ class LensShift:
         )
 
 
-def frame_samples(q: NDArray[np.floating], camera: CameraModel, rng: np.random.Generator) -> Frame:
+def frame_samples(
+    q: NDArray[np.floating], camera: CameraModel, rng: np.random.Generator
+) -> FrameSamples:
     """Sample a map (H, W, 2), pattern pixels with NaN = missing.
 
     Raises:
@@ -96,11 +98,11 @@ def frame_samples(q: NDArray[np.floating], camera: CameraModel, rng: np.random.G
     usable = clean_map(q)
     data = gather(q, usable, camera)
     few, some = (spread_sample(data, n, camera.width, rng) for n in (PROPOSE_POINTS, REFINE_POINTS))
-    return Frame(few, some, noise_scale(q, usable))
+    return FrameSamples(few, some, noise_scale(q, usable))
 
 
 def find_lens_shift(
-    frames: Sequence[Frame],
+    frames: Sequence[FrameSamples],
     projector: ProjectorModel,
     size: tuple[int, int],
     *,
@@ -122,7 +124,7 @@ def find_lens_shift(
     """
     width, height = size
     middle = ((width - 1) / 2, (height - 1) / 2)
-    tried: dict[float, list[State]] = {}
+    tried: dict[float, list[EpipolarState]] = {}
     for share in HEIGHTS:
         moved = projector.with_(centre=(middle[0], share * (height - 1)))
         states = [_best(f, moved, width, refine_focal, focal_guess) for f in frames]
@@ -146,19 +148,27 @@ def find_lens_shift(
 
 
 def _best(
-    frame: Frame, projector: ProjectorModel, width: int, refine_focal: bool, guess: float | None
-) -> State | None:
+    frame: FrameSamples,
+    projector: ProjectorModel,
+    width: int,
+    refine_focal: bool,
+    guess: float | None,
+) -> EpipolarState | None:
     """Return the best calibration of a frame at one centre, None where there is none."""
     focals, bounds = focal_lengths(projector, width, frame.few, refine_focal, guess)
     proposals = distinct(propose(frame.few, projector, focals), CANDIDATES)
-    problem = Problem(projector, refine_focal, bounds, frame.noise_px)
+    problem = RefinementProblem(projector, refine_focal, bounds, frame.noise_px)
     minima = refine(problem, ((p.pose, p.focal) for p in proposals), frame.some)
     return minima[0].state if minima else None
 
 
 def _descended(
-    frames: list[Frame], states: list[State], share: float, height: int, refine_focal: bool
-) -> list[State]:
+    frames: list[FrameSamples],
+    states: list[EpipolarState],
+    share: float,
+    height: int,
+    refine_focal: bool,
+) -> list[EpipolarState]:
     """Return the states at the best height near ``share``, poses and focal lengths following."""
     y = share * (height - 1)
     for reach in _REACH:
@@ -172,12 +182,16 @@ def _descended(
     return states
 
 
-def _settled(frames: Sequence[Frame], states: list[State], refine_focal: bool) -> list[State]:
+def _settled(
+    frames: Sequence[FrameSamples], states: list[EpipolarState], refine_focal: bool
+) -> list[EpipolarState]:
     """Return the minima next to the states; empty where points would lie behind the devices."""
-    settled: list[State] = []
+    settled: list[EpipolarState] = []
     for frame, state in zip(frames, states, strict=True):
         focal = float(state.projector.focal)
-        problem = Problem(state.projector, refine_focal, (focal / 2, 2 * focal), frame.noise_px)
+        problem = RefinementProblem(
+            state.projector, refine_focal, (focal / 2, 2 * focal), frame.noise_px
+        )
         minima = refine(problem, [(state.pose, focal)], frame.some)
         if not minima:
             return []
@@ -188,9 +202,11 @@ def _settled(frames: Sequence[Frame], states: list[State], refine_focal: bool) -
 class _Descent:
     """Cost of a height, from the best states met so far."""
 
-    def __init__(self, frames: list[Frame], states: list[State], refine_focal: bool) -> None:
+    def __init__(
+        self, frames: list[FrameSamples], states: list[EpipolarState], refine_focal: bool
+    ) -> None:
         self.frames, self.states, self.refine_focal = frames, states, refine_focal
-        self.losses = [Loss(True, REDESCENDING * max(robust_scale(s), MIN_SCALE_PX))
+        self.losses = [EpipolarLoss(True, REDESCENDING * max(robust_scale(s), MIN_SCALE_PX))
                        for s in states]  # fmt: skip
         self.cost = self._cost(states)
 
@@ -201,7 +217,7 @@ class _Descent:
             self.cost, self.states = cost, moved
         return cost
 
-    def _minimised(self, k: int, y: float) -> State:
+    def _minimised(self, k: int, y: float) -> EpipolarState:
         state, data = self.states[k], self.frames[k].some
         projector = state.projector.with_(centre=(state.projector.centre[0], y))
         return minimise(
@@ -209,11 +225,11 @@ class _Descent:
             refine_focal=self.refine_focal, iterations=_PATIENT,
         )  # fmt: skip
 
-    def _cost(self, states: list[State]) -> float:
+    def _cost(self, states: list[EpipolarState]) -> float:
         """Return the mean cost over the frames, each in squares of its own scale."""
         pairs = zip(self.losses, states, strict=True)
         return float(np.mean([loss.cost(s.r) / loss.scale**2 for loss, s in pairs]))
 
 
-def _scale(states: Sequence[State]) -> float:
+def _scale(states: Sequence[EpipolarState]) -> float:
     return max(robust_scale(s) for s in states)

@@ -4,7 +4,7 @@ import numpy as np
 
 from .choose import REDESCENDING, SIMILAR_COST, Minimum, robust_scale
 from .correspondences import Correspondences
-from .refine import Loss, State, focal_deviation
+from .refine import EpipolarLoss, EpipolarState, focal_deviation
 from .triangulate import ranges
 from .vectors import Vectors
 
@@ -29,7 +29,7 @@ def remarks(minima: list[Minimum], data: Correspondences, refine_focal: bool) ->
             "alternatives. Among equals the one with the smallest rotation was taken."
         )
     if refine_focal:
-        loss = Loss(True, REDESCENDING * robust_scale(best))
+        loss = EpipolarLoss(True, REDESCENDING * robust_scale(best))
         deviation = focal_deviation(best, data, loss)
         low, high = min([focal, *similar]), max([focal, *similar])
         if high > (1 + 2 * WEAK_FOCAL) * low:
@@ -48,7 +48,7 @@ def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def is_planar(state: State, data: Correspondences) -> bool:
+def is_planar(state: EpipolarState, data: Correspondences) -> bool:
     """Tell whether one plane explains the data about as well as the epipolar fit.
 
     On a plane the inverse range is linear in the ray: 1 / lambda = n . d. The fit is weighted to
@@ -69,7 +69,7 @@ def is_planar(state: State, data: Correspondences) -> bool:
     return float(np.percentile(np.abs(distance), 90)) < PLANAR * scale
 
 
-def _inverse_range_per_px(state: State, rays: Vectors, inverse: Vectors) -> Vectors:
+def _inverse_range_per_px(state: EpipolarState, rays: Vectors, inverse: Vectors) -> Vectors:
     """Return the change of inverse range that moves q by one pattern pixel, (N,)."""
     h = 1e-6 * float(np.median(np.abs(inverse)))
     turned, t = state.pose.R @ rays, state.pose.t[:, None]

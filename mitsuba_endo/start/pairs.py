@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .icp import Floats, Source, align, cost, match, sample
-from .placement import GATE_SCALE, JUDGED_POINTS, Pair, judge
-from .range_image import Frame, Level
+from .range_image import Level, RangePyramid
+from .registration_quality import GATE_SCALE, JUDGED_POINTS, PairRegistration, judge
 from .similarity import Similarities
 
 STARTS = 512
@@ -26,7 +26,9 @@ MIN_CANDIDATE_OVERLAP = 0.1
 """Share of the points that must find a partner for a candidate to count at all."""
 
 
-def register_pair(target: Frame, source: Frame, rng: np.random.Generator) -> Pair:
+def register_pair(
+    target: RangePyramid, source: RangePyramid, rng: np.random.Generator
+) -> PairRegistration:
     """Find the placement of ``source`` in ``target`` among random starts.
 
     Starts race: after a few Gauss-Newton steps on few points the best distinct ones go on with
@@ -38,27 +40,27 @@ def register_pair(target: Frame, source: Frame, rng: np.random.Generator) -> Pai
         poses = align(poses, cloud, target.coarse, scale, steps)
         poses, _ = _best(poses, _score(poses, cloud, target.coarse, scale), keep)
         if not len(poses):
-            return Pair()
+            return PairRegistration()
     poses = _finish(poses, target, source, rng)
     poses, score = _best(poses, _mutual_score(poses, target, source, rng), len(poses))
     if not len(poses):
-        return Pair()
+        return PairRegistration()
     runner_up = float(score[1] / score[0]) if len(poses) > 1 else np.inf
-    return Pair(poses[:1], judge(poses[:1], target, source, rng), runner_up)
+    return PairRegistration(poses[:1], judge(poses[:1], target, source, rng), runner_up)
 
 
 def refine_pair(
-    guess: Similarities, target: Frame, source: Frame, rng: np.random.Generator
-) -> Pair:
+    guess: Similarities, target: RangePyramid, source: RangePyramid, rng: np.random.Generator
+) -> PairRegistration:
     """Improve a placement that is nearly right; there is no runner-up to compare with."""
     cloud = sample(source.fine, JUDGED_POINTS, rng)
     pose = align(guess, cloud, target.fine, GATE_SCALE, FINAL_STEPS)
     pose = _finish(pose, target, source, rng)
-    return Pair(pose, judge(pose, target, source, rng), np.inf)
+    return PairRegistration(pose, judge(pose, target, source, rng), np.inf)
 
 
 def _finish(
-    poses: Similarities, target: Frame, source: Frame, rng: np.random.Generator
+    poses: Similarities, target: RangePyramid, source: RangePyramid, rng: np.random.Generator
 ) -> Similarities:
     cloud = sample(source.fine, JUDGED_POINTS, rng)
     for scale in FINAL_SCALES:
@@ -91,7 +93,7 @@ def _score(poses: Similarities, cloud: Source, target: Level, scale: float) -> F
 
 
 def _mutual_score(
-    poses: Similarities, target: Frame, source: Frame, rng: np.random.Generator
+    poses: Similarities, target: RangePyramid, source: RangePyramid, rng: np.random.Generator
 ) -> Floats:
     """Return the score (B,) over both directions: a match to a far, small place fails backwards.
 

@@ -17,7 +17,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rota
 
 from .correspondences import Correspondences
 from .epipolar import Bearings, bearings, residuals
-from .refine import Loss, evaluate
+from .refine import EpipolarLoss, evaluate
 from .triangulate import in_front
 from .vectors import Vectors
 
@@ -194,7 +194,9 @@ def _scored(
     pose: RigidTransform, data: Correspondences, projector: ProjectorModel, seen: Bearings
 ) -> Proposal:
     pose, front = facing(pose, data, seen, THRESHOLD_PX / projector.focal)
-    fit = Loss(redescending=False, scale=SCORE_PX).cost(evaluate(pose, projector, data, seen).r)
+    fit = EpipolarLoss(redescending=False, scale=SCORE_PX).cost(
+        evaluate(pose, projector, data, seen).r
+    )
     return Proposal(pose, projector.focal, fit + SCORE_PX**2 * (1 - front))
 
 

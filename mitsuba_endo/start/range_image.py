@@ -70,7 +70,7 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class RangePyramid:
     """A range image in the common unit of all frames, and its levels, made when asked for."""
 
     image: RangeImage

@@ -21,7 +21,7 @@ _COST_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
-class Loss:
+class EpipolarLoss:
     """A robust loss of residuals in pattern pixels; both have curvature 1 at zero."""
 
     redescending: bool
@@ -45,7 +45,7 @@ class Loss:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class EpipolarState:
     """A calibration with its bearings and residuals."""
 
     pose: RigidTransform
@@ -65,22 +65,22 @@ def evaluate(
     projector: ProjectorModel,
     data: Correspondences,
     seen: Bearings | None = None,
-) -> State:
+) -> EpipolarState:
     """Return the state at a calibration; ``seen`` are the bearings where they are known already."""
     if seen is None:
         seen = bearings(projector, data.q)
-    return State(pose, projector, seen, residuals(pose, data.rays, seen))
+    return EpipolarState(pose, projector, seen, residuals(pose, data.rays, seen))
 
 
 def minimise(
-    state: State,
+    state: EpipolarState,
     data: Correspondences,
-    loss: Loss,
+    loss: EpipolarLoss,
     *,
     refine_focal: bool,
     focal_bounds: tuple[float, float] = (0.0, np.inf),
     iterations: int = 20,
-) -> State:
+) -> EpipolarState:
     """Return the state at the minimum of the mean loss near ``state``.
 
     The damping follows the ratio of gained to predicted cost (Nielsen 1999), which in the curved
@@ -113,7 +113,7 @@ def minimise(
     return state
 
 
-def focal_deviation(state: State, data: Correspondences, loss: Loss) -> float:
+def focal_deviation(state: EpipolarState, data: Correspondences, loss: EpipolarLoss) -> float:
     """Return the formal standard deviation of log focal: (J^T W J)^-1 times the noise variance."""
     hessian, _ = _normal_equations(state, data, loss, True)
     noise = 1.4826 * float(np.median(np.abs(state.r)))
@@ -124,7 +124,7 @@ def focal_deviation(state: State, data: Correspondences, loss: Loss) -> float:
 
 
 def _normal_equations(
-    state: State, data: Correspondences, loss: Loss, refine_focal: bool
+    state: EpipolarState, data: Correspondences, loss: EpipolarLoss, refine_focal: bool
 ) -> tuple[Vectors, Vectors]:
     r = state.r
     J = jacobian(state.pose, state.projector, data.rays, data.q, state.seen, state.at, refine_focal)
@@ -140,7 +140,7 @@ def _damped_step(hessian: Vectors, gradient: Vectors, damping: float) -> Vectors
     return -np.linalg.solve(damped, gradient).astype(np.float64, copy=False)
 
 
-def _moved(state: State, step: Vectors, data: Correspondences) -> State:
+def _moved(state: EpipolarState, step: Vectors, data: Correspondences) -> EpipolarState:
     t = state.pose.t + tangent_basis(state.pose.t) @ step[3:5]
     pose = RigidTransform(rotation_from_vector(step[:3]) @ state.pose.R, t / np.linalg.norm(t))
     if step.size == 5:

@@ -13,9 +13,9 @@ import numpy as np
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform
 
-from .frame_graph import FrameGraph, Placed
-from .placement import Pair
-from .range_image import Frame, RangeImage, typical_range
+from .frame_graph import ChainedFrame, FrameGraph
+from .range_image import RangeImage, RangePyramid, typical_range
+from .registration_quality import PairRegistration
 
 __all__ = ["RangeImage", "Registration", "register_frames"]
 
@@ -72,7 +72,7 @@ def register_frames(
     units = np.array([typical_range(image) for image in images])
     # A frame without a single range gets a unit from the others, and is then found unusable.
     unit = float(np.median(units[np.isfinite(units)])) if np.isfinite(units).any() else 1.0
-    frames = [Frame(image, unit) for image in images]
+    frames = [RangePyramid(image, unit) for image in images]
     if not any(frame.usable for frame in frames):
         raise InputError(
             "no frame has a usable range image", todo="check the correspondence maps of the frames"
@@ -94,7 +94,7 @@ def _collect(graph: FrameGraph, unit: float) -> list[Registration]:
     ]
 
 
-def _placed(frame: Placed, unit: float, *, is_world: bool) -> Registration:
+def _placed(frame: ChainedFrame, unit: float, *, is_world: bool) -> Registration:
     where, fit = frame.root_from_frame, frame.last.fit
     pose = RigidTransform(where.R[0], unit * where.t[0])
     residual, overlap = (0.0, 1.0) if is_world else (fit.residual, fit.overlap[0])
@@ -105,7 +105,7 @@ def _left_out(graph: FrameGraph, k: int, group: list[int]) -> Registration:
     """Report frame ``k`` by the attempt that came nearest to working."""
     nowhere = RigidTransform(np.full((3, 3), np.nan), np.full(3, np.nan))
     attempts = graph.attempts(k, group)
-    best = min(attempts.values(), key=lambda p: p.fit.residual, default=Pair())
+    best = min(attempts.values(), key=lambda p: p.fit.residual, default=PairRegistration())
     fit = best.fit
     return Registration(
         nowhere, float("nan"), fit.residual, fit.overlap[0], False, _reason(graph, k, group)

@@ -15,7 +15,7 @@ from .choose import (
     REDESCENDING,
     SIMILAR_COST,
     Minimum,
-    Problem,
+    RefinementProblem,
     cost_margin,
     refine,
     robust_scale,
@@ -23,7 +23,7 @@ from .choose import (
 from .correspondences import Correspondences, spread_sample
 from .notes import is_planar
 from .propose import distinct, propose
-from .refine import Loss, evaluate, minimise
+from .refine import EpipolarLoss, evaluate, minimise
 
 SAMPLE = 4000
 """Correspondences that are looked at; twins differ in all of them."""
@@ -76,7 +76,7 @@ def rivals(
     few = spread_sample(some, SAMPLE // 8, width, rng)
     focal = float(projector.focal)
     bounds = (focal / _FOCAL_FACTOR, focal * _FOCAL_FACTOR)
-    problem = Problem(projector, refine_focal, bounds, noise_px)
+    problem = RefinementProblem(projector, refine_focal, bounds, noise_px)
     unit = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
     found = distinct(propose(few, projector, np.array([focal])), _PROPOSALS)
     starts = [(unit, focal), *((p.pose, p.focal) for p in found)]
@@ -84,7 +84,7 @@ def rivals(
 
 
 def _rated(
-    problem: Problem,
+    problem: RefinementProblem,
     pose: RigidTransform,
     minima: list[Minimum],
     data: Correspondences,
@@ -92,7 +92,7 @@ def _rated(
     """Compare the minima with the given calibration under one loss; drop itself and worse ones."""
     given = evaluate(pose, problem.projector, data)
     scale = robust_scale(given)
-    loss = Loss(True, REDESCENDING * scale)
+    loss = EpipolarLoss(True, REDESCENDING * scale)
     given = minimise(
         given, data, loss, refine_focal=problem.refine_focal, focal_bounds=problem.focal_bounds
     )

@@ -9,11 +9,11 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import ProjectorModel
 
-from .choose import Minimum, Problem, finish, refine, robust_scale
+from .choose import Minimum, RefinementProblem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
 from .correspondences import Correspondences, checked_map, gather, spread_sample
 from .depth_image import depth_image
-from .lens_shift import PROPOSE_POINTS, REFINE_POINTS, Frame, find_lens_shift
+from .lens_shift import PROPOSE_POINTS, REFINE_POINTS, FrameSamples, find_lens_shift
 from .notes import remarks
 from .propose import distinct, focal_lengths, propose
 from .refine import evaluate
@@ -79,7 +79,7 @@ def search_start(
     if search_centre:
         say("search for the projector's centre")
         shift = find_lens_shift(
-            [Frame(few, some, noise)], projector, size, refine_focal=refine_focal,
+            [FrameSamples(few, some, noise)], projector, size, refine_focal=refine_focal,
             focal_guess=focal_guess,
         )  # fmt: skip
         projector, notes = projector.with_(centre=shift.centre), [shift.note]
@@ -89,7 +89,7 @@ def search_start(
     focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
     say("refine candidates")
-    problem = Problem(projector, refine_focal, bounds, noise)
+    problem = RefinementProblem(projector, refine_focal, bounds, noise)
     minima = refine(problem, [*known, *((p.pose, p.focal) for p in proposals)], some)
     say("finish")
     minima = finish(problem, minima, some, many) if minima else []

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.transforms import angle_between, rotation_angle
-from mitsuba_endo.rendering.synthetic import Correspondences, MeshScene
+from mitsuba_endo.rendering.synthetic import ExactView, MeshScene
 
 from .capture import Truth
 from .decoder_noise import Plain
@@ -14,7 +14,7 @@ from .peers import Found
 Floats = NDArray[np.float64]
 
 
-def exact_view(truth: Truth) -> Correspondences:
+def exact_view(truth: Truth) -> ExactView:
     """Return what the first frame sees, without any error."""
     scene = MeshScene(truth.mesh.vertices, truth.mesh.faces)
     at, lit = truth.world_from_camera[0], truth.projector_from_camera[0]

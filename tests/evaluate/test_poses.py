@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.evaluate.figure import Figure, rms
+from mitsuba_endo.evaluate.metric import Metric, rms
 from mitsuba_endo.evaluate.poses import (
     baseline_error,
     camera_errors,
@@ -72,7 +72,7 @@ def test_unknown_pose():
     unknown = PoseEstimate(R=None, t=None, status="unobservable", reason="no parallax")
     for function in (rotation_error, translation_direction_error, baseline_error):
         found = function(unknown, _estimate(TRUTH))
-        assert found == Figure(None, "the solution's pose is null (no parallax)")
+        assert found == Metric(None, "the solution's pose is null (no parallax)")
     known = _estimate(TRUTH)
     assert camera_errors((known, unknown), (known, known))[0].value is None
 
@@ -95,7 +95,7 @@ def test_camera_motion_does_not_depend_on_the_world():
 def test_rms_over_frames():
     """Oracle: sqrt((3^2 + 4^2) / 2), signs lost; missing frames are named."""
     names = ["a", "b", "c"]
-    assert rms([Figure(3.0), Figure(-4.0)], names[:2]) == Figure(np.sqrt(12.5))
-    partly = rms([Figure(3.0), Figure(None, "dark"), Figure(-4.0)], names)
-    assert partly == Figure(np.sqrt(12.5), "over 2 of 3 frames (frame b: dark)")
-    assert rms([Figure(None, "dark")], ["a"]) == Figure(None, "frame a: dark")
+    assert rms([Metric(3.0), Metric(-4.0)], names[:2]) == Metric(np.sqrt(12.5))
+    partly = rms([Metric(3.0), Metric(None, "dark"), Metric(-4.0)], names)
+    assert partly == Metric(np.sqrt(12.5), "over 2 of 3 frames (frame b: dark)")
+    assert rms([Metric(None, "dark")], ["a"]) == Metric(None, "frame a: dark")

@@ -24,9 +24,9 @@ from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Estimate, LeftOut, Outcome, PoseEstimate, save_solution
 from mitsuba_endo.records.surface import save_surface
-from mitsuba_endo.show.content import Content
 from mitsuba_endo.show.read_folder import read_solution_folder
 from mitsuba_endo.show.report import save_report
+from mitsuba_endo.show.result_scene import ResultScene
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.truth import load_truth
 from mitsuba_endo.show.view import view_surface
@@ -216,11 +216,11 @@ def _scene(text: str) -> dict[str, Any]:
 
 
 def _canvas(calibration: Calibration, truth: Path | None = None) -> str:
-    content = Content(calibration)
+    scene = ResultScene(calibration)
     if truth is not None:
-        content.truth = load_truth(truth, calibration)
-    views = [view_surface(s, calibration.camera) for s in content.surfaces]
-    return scene_canvas(content, views)
+        scene.truth = load_truth(truth, calibration)
+    views = [view_surface(s, calibration.camera) for s in scene.surfaces]
+    return scene_canvas(scene, views)
 
 
 def _points(surface: dict[str, Any]) -> np.ndarray:

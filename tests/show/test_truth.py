@@ -13,7 +13,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration, SurfaceEstimate
 from mitsuba_endo.records.solution import Outcome, PoseEstimate, Solution, save_solution
 from mitsuba_endo.records.surface import save_surface
-from mitsuba_endo.show.content import Content
+from mitsuba_endo.show.result_scene import ResultScene
 from mitsuba_endo.show.truth import find_truth, load_truth, surface_error
 
 Maker = Callable[..., Calibration]
@@ -117,11 +117,11 @@ def test_up_to_scale_is_aligned(tmp_path: Path, calibration: Calibration):
         solution=_in_baselines(calibration.solution, 6.2),
         surface=replace(surface, vertices=surface.vertices / 6.2),
     )
-    content = Content(unscaled)
-    content.compare(path)
-    assert content.truth is not None
-    assert content.truth.alignment == "scale"
-    for mine, true in zip(content.places, content.truth.places, strict=True):
+    scene = ResultScene(unscaled)
+    scene.compare(path)
+    assert scene.truth is not None
+    assert scene.truth.alignment == "scale"
+    for mine, true in zip(scene.poses, scene.truth.poses, strict=True):
         for a, b in (
             (mine.first_from_camera, true.first_from_camera),
             (mine.first_from_projector, true.first_from_projector),
@@ -129,10 +129,10 @@ def test_up_to_scale_is_aligned(tmp_path: Path, calibration: Calibration):
             assert a is not None
             assert b is not None
             np.testing.assert_allclose(b.t, a.t, atol=1e-5)
-    assert content.errors is not None
-    assert np.nanmax(np.abs(content.errors[0])) < 1e-4
-    assert [q.name for q in content.quantities()] == ["uncertainty", "error to truth", "depth"]
-    assert "baselines, scale aligned" in content.quantities()[1].label
+    assert scene.errors is not None
+    assert np.nanmax(np.abs(scene.errors[0])) < 1e-4
+    assert [q.name for q in scene.quantities()] == ["uncertainty", "error to truth", "depth"]
+    assert "baselines, scale aligned" in scene.quantities()[1].label
 
 
 def test_frames_must_be_the_same(tmp_path: Path, calibration: Calibration, make_calibration: Maker):

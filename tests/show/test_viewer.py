@@ -16,8 +16,8 @@ import pytest
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.rig import Camera, Rig
-from mitsuba_endo.show.content import Content
 from mitsuba_endo.show.read_folder import read_solution_folder
+from mitsuba_endo.show.result_scene import ResultScene
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.viewer import LiveView, Viewer, address, open_viewer, running_server
 from mitsuba_endo.show.viewer.nodes import said
@@ -48,12 +48,12 @@ def viewer(server: Any, calibration: Calibration) -> Viewer:
 
 
 def _frames(viewer: Viewer) -> set[int]:
-    return {int(n.split("/")[1][6:]) for n in viewer.stage.nodes.visible if "/frame_" in n}
+    return {int(n.split("/")[1][6:]) for n in viewer.viser_scene.nodes.visible if "/frame_" in n}
 
 
 def test_scene_follows_the_controls(viewer: Viewer, server: Any):
     """Oracle: the names of the nodes that each control is for, on viser's own scene."""
-    change, nodes = viewer.controls.change, viewer.stage.nodes
+    change, nodes = viewer.controls.change, viewer.viser_scene.nodes
     names = [f"/frame_{k}/{kind}{n}" for k in range(3) for kind in ("camera", "projector")
              for n in ("", "_name")]  # fmt: skip
     assert nodes.visible == sorted([*names, "/surface/0"])
@@ -83,7 +83,7 @@ def test_iterations_move_what_is_shown(viewer: Viewer, server: Any, calibration:
         lines = server.scene.get_handle_by_name("/iteration/frame_0/projector").points
         np.testing.assert_allclose(lines[0, 0], -pose.R.T @ pose.t, rtol=1e-5)
     viewer.controls.change(snapshot=None)
-    assert "/surface/0" in viewer.stage.nodes.visible
+    assert "/surface/0" in viewer.viser_scene.nodes.visible
 
 
 def test_frames_are_read_when_their_rays_are_wanted(
@@ -96,16 +96,16 @@ def test_frames_are_read_when_their_rays_are_wanted(
     damaged.write_bytes(damaged.read_bytes()[:500])
     viewer = open_viewer(server, read_solution_folder(tmp_path / "out"))
     viewer.controls.change(frame=0, rays=True)
-    found, kept = Content(calibration).rays(0), viewer.content.rays(0)
+    found, kept = ResultScene(calibration).rays(0), viewer.scene.rays(0)
     assert found is not None
     assert kept is not None
     np.testing.assert_allclose(kept.camera, found.camera, rtol=1e-4)
-    assert "/rays_0/camera" in viewer.stage.nodes.visible
+    assert "/rays_0/camera" in viewer.viser_scene.nodes.visible
     viewer.controls.change(frame=1, rays=True)
     assert damaged.name in viewer.controls._fault.content
     assert viewer.controls.boxes["rays"].disabled
-    assert {"/surface/0", "/frame_1/camera"} <= set(viewer.stage.nodes.visible)
-    assert not any("rays" in name for name in viewer.stage.nodes.visible)
+    assert {"/surface/0", "/frame_1/camera"} <= set(viewer.viser_scene.nodes.visible)
+    assert not any("rays" in name for name in viewer.viser_scene.nodes.visible)
 
 
 def test_own_surfaces_are_shown_with_their_frame(
@@ -113,9 +113,9 @@ def test_own_surfaces_are_shown_with_their_frame(
 ):
     """Oracle: one surface a frame, placed where that frame's camera is."""
     viewer = open_viewer(server, with_own_surfaces(calibration))
-    assert "/surface/0" in viewer.stage.nodes.visible
+    assert "/surface/0" in viewer.viser_scene.nodes.visible
     viewer.controls.change(frame=2)
-    assert [n for n in viewer.stage.nodes.visible if "surface" in n] == ["/surface/2"]
+    assert [n for n in viewer.viser_scene.nodes.visible if "surface" in n] == ["/surface/2"]
     pose = calibration.solution.frames[2].world_from_camera
     handle = server.scene.get_handle_by_name("/surface/2")
     np.testing.assert_allclose(handle.position, pose.t, atol=1e-6)
@@ -156,7 +156,7 @@ def test_truth_is_offered_when_it_is_loaded(server: Any, calibration: Calibratio
     assert viewer.faults == []
     viewer.controls.change(truth=True, colour="error to truth")
     for part in ("surface", "frame_0/camera", "frame_2/projector"):
-        assert f"/truth/{part}" in viewer.stage.nodes.visible
+        assert f"/truth/{part}" in viewer.viser_scene.nodes.visible
     mine, true = (
         server.scene.get_handle_by_name(f"{p}frame_2/projector").points for p in ("/", "/truth/")
     )

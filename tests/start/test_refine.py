@@ -5,14 +5,14 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import angle_between
 from mitsuba_endo.start.correspondences import gather, spread_sample
-from mitsuba_endo.start.refine import Loss, evaluate, focal_deviation, minimise
+from mitsuba_endo.start.refine import EpipolarLoss, evaluate, focal_deviation, minimise
 from tests.rigs import random_rig, with_noise
 
 
 @pytest.mark.parametrize("redescending", [False, True])
 def test_weight_is_the_derivative_of_the_loss(redescending):
     """Oracle: rho'(r) = w(r) r by central differences; w(0) = 1."""
-    loss, h = Loss(redescending, 1.7), 1e-5
+    loss, h = EpipolarLoss(redescending, 1.7), 1e-5
     for r in (0.2, 1.0, 4.0):
         slope = (loss.cost(np.array([r + h])) - loss.cost(np.array([r - h]))) / (2 * h)
         assert slope == pytest.approx(float(loss.weight(np.array([r]))[0]) * r, rel=1e-8)
@@ -39,7 +39,7 @@ def test_descends_to_the_truth_of_exact_data(seed):
     """Oracle: exact correspondences have their minimum at the truth."""
     rig, data = _data(seed, 0.0)
     state = _from_truth(rig, data, 1.1)
-    found = minimise(state, data, Loss(False, 20.0), refine_focal=True, iterations=100)
+    found = minimise(state, data, EpipolarLoss(False, 20.0), refine_focal=True, iterations=100)
     assert found.projector.focal == pytest.approx(rig.projector.focal, rel=1e-4)
     assert angle_between(found.pose.t, rig.projector_from_camera.t) < 1e-3
 
@@ -47,7 +47,9 @@ def test_descends_to_the_truth_of_exact_data(seed):
 def test_a_fixed_focal_length_stays():
     """Oracle: the value given."""
     rig, data = _data(0, 0.3)
-    found = minimise(_from_truth(rig, data, 1.1), data, Loss(False, 5.0), refine_focal=False)
+    found = minimise(
+        _from_truth(rig, data, 1.1), data, EpipolarLoss(False, 5.0), refine_focal=False
+    )
     assert found.projector.focal == 1.1 * rig.projector.focal
 
 
@@ -58,7 +60,7 @@ def test_bounds_stop_the_focal_length():
     start = evaluate(
         _from_truth(rig, data).pose, rig.projector.with_(focal=0.9 * rig.projector.focal), data
     )
-    found = minimise(start, data, Loss(False, 5.0), refine_focal=True, focal_bounds=bound)
+    found = minimise(start, data, EpipolarLoss(False, 5.0), refine_focal=True, focal_bounds=bound)
     assert 0.9 * rig.projector.focal < found.projector.focal <= bound[1]
 
 
@@ -70,7 +72,7 @@ def test_focal_deviation_is_the_scatter_of_repeated_fits():
     for draw in range(60):
         data = gather(with_noise(rig, 0.3, draw).q, seen, rig.camera)
         data = spread_sample(data, 800, rig.camera.width, np.random.default_rng(draw))
-        loss = Loss(False, 10.0)
+        loss = EpipolarLoss(False, 10.0)
         found = minimise(_from_truth(rig, data), data, loss, refine_focal=True)
         focals.append(np.log(found.projector.focal))
         formal.append(focal_deviation(found, data, loss))

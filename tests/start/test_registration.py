@@ -10,9 +10,9 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.start.frame_graph import LOOP, FrameGraph
 from mitsuba_endo.start.pairs import register_pair
-from mitsuba_endo.start.placement import FLAT
-from mitsuba_endo.start.range_image import Frame, make_level, typical_range
+from mitsuba_endo.start.range_image import RangePyramid, make_level, typical_range
 from mitsuba_endo.start.registration import EMPTY, RangeImage, Registration, register_frames
+from mitsuba_endo.start.registration_quality import FLAT
 from mitsuba_endo.start.similarity import Similarities
 from tests.range_scenes import (
     SURFACES,
@@ -101,7 +101,7 @@ def test_thing_before_a_wall(llvm: str) -> None:
         for p in (RigidTransform.identity(), moved)
     ]
     unit = typical_range(images[0])
-    target, source = (Frame(image, unit) for image in images)
+    target, source = (RangePyramid(image, unit) for image in images)
     pair = register_pair(target, source, np.random.default_rng(0))
     assert not pair.fault
     np.testing.assert_allclose(unit * pair.target_from_source.t[0], moved.t, atol=0.5)
@@ -225,7 +225,7 @@ def test_loop_exposes_a_wrong_placement(sheet: Scene) -> None:
     """A forged placement of the last frame contradicts frames 0 and 1 and is dropped."""
     unit = float(np.median([typical_range(i) for i in sheet.images]))
     graph = FrameGraph(
-        [Frame(i, unit) for i in sheet.images], np.random.default_rng(0), lambda _: None
+        [RangePyramid(i, unit) for i in sheet.images], np.random.default_rng(0), lambda _: None
     )
     graph.connect()
     assert graph.largest_group() == [0, 1, 2, 3]

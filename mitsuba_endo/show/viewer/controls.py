@@ -6,28 +6,28 @@ from typing import Any
 
 from ...errors import InputError
 from ...records.calibration import Snapshot
-from ..content import Content
-from ..numbers import headline
+from ..result_scene import ResultScene
+from ..solution_values import headline
 from .choice import Choice
 from .cost_chart import add_cost_chart, chart_data
 from .nodes import listed, said, small
 from .picking import Picker
-from .stage import Stage
+from .viser_scene import ViserScene
 
 ALL = "all"
 
 
 class Controls:
-    """Connects the panel to the stage. viser calls back from several threads: one at a time."""
+    """Connects the panel to the scene. viser calls back from several threads: one at a time."""
 
-    def __init__(self, server: Any, content: Content, stage: Stage) -> None:
-        self.server, self.content, self.stage = server, content, stage
-        self.choice = Choice(frame=0 if len(content.surfaces) > 1 else None)
-        self.picker = Picker(server, content)
+    def __init__(self, server: Any, scene: ResultScene, viser_scene: ViserScene) -> None:
+        self.server, self.scene, self.viser_scene = server, scene, viser_scene
+        self.choice = Choice(frame=0 if len(scene.surfaces) > 1 else None)
+        self.picker = Picker(server, scene)
         self.boxes: dict[str, Any] = {}
         """Check boxes by the choice that they are for."""
         self._lock = threading.RLock()
-        self._history = content.calibration.history
+        self._history = scene.calibration.history
         self._say_result()
         self._add_show()
         self._add_iterations()
@@ -39,7 +39,7 @@ class Controls:
         with self._lock:
             self.choice = replace(self.choice, **changes)
             try:
-                self.stage.draw(self.choice)
+                self.viser_scene.draw(self.choice)
             except InputError as error:
                 self._leave_rays_out(error)
             self._legend.content = self._legend_text()
@@ -51,17 +51,17 @@ class Controls:
         box = self.boxes["rays"]
         box.value, box.disabled = False, True
         self.choice = replace(self.choice, rays=False)
-        self.stage.draw(self.choice)
+        self.viser_scene.draw(self.choice)
 
     def truth_is_known(self) -> None:
-        """Offer what can be shown with the truth that the content now has."""
+        """Offer what can be shown with the truth that the scene now has."""
         with self._lock:
-            self._colour.options = tuple(q.name for q in self.content.quantities())
+            self._colour.options = tuple(q.name for q in self.scene.quantities())
             self._truth.disabled = False
-            self._truth.hint = f"Truth in grey, from {self.content.truth.path}"  # type: ignore[union-attr]
+            self._truth.hint = f"Truth in grey, from {self.scene.truth.path}"  # type: ignore[union-attr]
 
     def _say_result(self) -> None:
-        solution = self.content.calibration.solution
+        solution = self.scene.calibration.solution
         outcome, *facts = headline(solution).split("; ")
         gui = self.server.gui
         gui.add_html(said(outcome.replace("_", " "), bold=True))
@@ -73,11 +73,11 @@ class Controls:
                 )
 
     def _add_show(self) -> None:
-        gui, content = self.server.gui, self.content
+        gui, scene = self.server.gui, self.scene
         with gui.add_folder("Show"):
-            if len(content.places) > 1:
+            if len(scene.poses) > 1:
                 self._add_frames()
-            quantities = content.quantities()
+            quantities = scene.quantities()
             self._colour = gui.add_dropdown(
                 "colour", [q.name for q in quantities], initial_value=quantities[0].name
             )
@@ -95,8 +95,8 @@ class Controls:
             self._truth.disabled = True
 
     def _add_frames(self) -> None:
-        names = [place.name for place in self.content.places]
-        least = 1 if len(self.content.surfaces) > 1 else 0
+        names = [at.name for at in self.scene.poses]
+        least = 1 if len(self.scene.surfaces) > 1 else 0
         slider = self.server.gui.add_slider("frame", least, len(names), 1, least)
         told = self.server.gui.add_html("")
 
@@ -158,7 +158,7 @@ class Controls:
         """Pick a point where a ray meets the surface; by default one of the first camera."""
         with self._lock:
             if self.choice.snapshot is None and self.choice.surface:
-                surfaces = self.stage.shown_surfaces(self.choice)
+                surfaces = self.viser_scene.shown_surfaces(self.choice)
                 self.picker.add(origin, direction, surfaces)
             else:
                 self.picker.words = "Show the result's surface first."
@@ -170,7 +170,7 @@ class Controls:
             self._told.content = said(self.picker.words)
 
     def _legend_text(self) -> str:
-        quantities = self.content.quantities()
+        quantities = self.scene.quantities()
         named = [q for q in quantities if q.name == self.choice.colour]
         return (named or quantities)[0].legend()
 

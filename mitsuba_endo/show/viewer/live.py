@@ -8,11 +8,11 @@ from ...geometry.laws import LAWS, projector_model
 from ...records.calibration import Snapshot
 from ...records.rig import Rig
 from ..colours import CAMERA, PROJECTOR
-from ..places import REACH, camera_corners, pattern_corners, pyramid
+from ..frame_poses import REACH, camera_corners, pattern_corners, pyramid
 from .controls import snapshot_words
 from .cost_chart import add_cost_chart, chart_data
 from .nodes import Nodes, said, small
-from .stage import light, look_from, put_snapshot_surface, snapshot_place
+from .viser_scene import light, look_from, put_snapshot_surface, snapshot_poses
 
 
 class LiveView:
@@ -51,15 +51,15 @@ class LiveView:
         self._state.content = said(words, bold=True)
 
     def _frusta(self, snapshot: Snapshot, frame: int) -> None:
-        place, projector = snapshot_place(snapshot, frame), self._rig.projector
+        at, projector = snapshot_poses(snapshot, frame), self._rig.projector
         reach = REACH * float(np.median(np.linalg.norm(snapshot.surfaces[0], axis=-1)))
         law = projector.law if projector.law in LAWS else next(iter(LAWS))
         size = projector.width, projector.height
         centre = [(n - 1) / 2 for n in size]
         corners = {
-            "camera": (place.first_from_camera, camera_corners(self._rig.camera.to_model())),
+            "camera": (at.first_from_camera, camera_corners(self._rig.camera.to_model())),
             "projector": (
-                place.first_from_projector,
+                at.first_from_projector,
                 pattern_corners(projector_model(law, snapshot.focal[frame], centre), size),
             ),
         }

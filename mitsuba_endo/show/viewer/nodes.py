@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.colors import to_rgb
 
-from ..places import Floats
+from ..frame_poses import Floats
 
 
 @dataclass(eq=False)

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ..content import Content
 from ..measure import SurfacePoint, distance, pick
+from ..result_scene import ResultScene
 
 MARK = (204, 0, 102)
 HINT = "Tick, then click two points on the surface."
@@ -14,8 +14,8 @@ HINT = "Tick, then click two points on the surface."
 class Picker:
     """Points picked so far, their marks in the scene, and the measured distance."""
 
-    def __init__(self, server: Any, content: Content) -> None:
-        self.server, self.content = server, content
+    def __init__(self, server: Any, scene: ResultScene) -> None:
+        self.server, self.scene = server, scene
         self.points: list[tuple[int, SurfacePoint]] = []
         """Surface and point."""
         self.words = HINT
@@ -49,32 +49,32 @@ class Picker:
     ) -> tuple[int, SurfacePoint] | None:
         hits = []
         for k in surfaces:
-            surface_from_first = self.content.first_from_surface(k).inverse()
+            surface_from_first = self.scene.first_from_surface(k).inverse()
             start, along = surface_from_first.apply(origin), surface_from_first.rotate(direction)
-            point = pick(self.content.surfaces[k], start, along)
+            point = pick(self.scene.surfaces[k], start, along)
             if point is not None:
                 hits.append((float(np.linalg.norm(point.position - start)), k, point))
         return min(hits, key=lambda hit: hit[0])[1:] if hits else None
 
     def _place(self, picked: tuple[int, SurfacePoint]) -> np.ndarray:
-        return self.content.first_from_surface(picked[0]).apply(picked[1].position)
+        return self.scene.first_from_surface(picked[0]).apply(picked[1].position)
 
     def _mark(self, picked: tuple[int, SurfacePoint]) -> None:
         name = f"/measure/point_{len(self.points)}"
         self._marks.append(
             self.server.scene.add_icosphere(
-                name, 0.009 * self.content.distance, MARK, position=self._place(picked)
+                name, 0.009 * self.scene.distance, MARK, position=self._place(picked)
             )
         )
 
     def _above(self, ends: np.ndarray) -> np.ndarray:
         """Return a place beside the upper end; y points down."""
-        return ends[ends[:, 1].argmin()] - [0.0, 0.03 * self.content.distance, 0.0]
+        return ends[ends[:, 1].argmin()] - [0.0, 0.03 * self.scene.distance, 0.0]
 
     def _measure(self) -> str:
         (surface, a), (_, b) = self.points
-        solution = self.content.calibration.solution
-        found = distance(self.content.surfaces[surface], a, b, solution.scale_std_percent)
+        solution = self.scene.calibration.solution
+        found = distance(self.scene.surfaces[surface], a, b, solution.scale_std_percent)
         ends = np.stack([self._place(p) for p in self.points])
         scene = self.server.scene
         self._marks.append(

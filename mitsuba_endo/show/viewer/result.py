@@ -7,17 +7,17 @@ from typing import Any
 
 from ...errors import InputError
 from ...records.calibration import Calibration
-from ..content import Content
+from ..result_scene import ResultScene
 from .controls import Controls
-from .stage import Stage
+from .viser_scene import ViserScene
 
 
 @dataclass(frozen=True, eq=False)
 class Viewer:
     """What is shown on a server."""
 
-    content: Content
-    stage: Stage
+    scene: ResultScene
+    viser_scene: ViserScene
     controls: Controls
     comparison: threading.Thread | None = None
     """Loads the truth; Mitsuba, which it needs, takes longer to start than the viewer."""
@@ -27,16 +27,16 @@ class Viewer:
 
 def open_viewer(server: Any, calibration: Calibration, truth: Path | None = None) -> Viewer:
     """Show a result on a server of :func:`running_server`; the truth follows when it is loaded."""
-    content = Content(calibration)
-    stage = Stage(server, content)
-    controls = Controls(server, content, stage)
+    scene = ResultScene(calibration)
+    viser_scene = ViserScene(server, scene)
+    controls = Controls(server, scene, viser_scene)
     if truth is None:
-        return Viewer(content, stage, controls)
+        return Viewer(scene, viser_scene, controls)
     faults: list[InputError] = []
 
     def compare() -> None:
         try:
-            content.compare(truth)
+            scene.compare(truth)
         except InputError as error:
             faults.append(error)
             return
@@ -44,4 +44,4 @@ def open_viewer(server: Any, calibration: Calibration, truth: Path | None = None
 
     thread = threading.Thread(target=compare, name="truth")
     thread.start()
-    return Viewer(content, stage, controls, thread, faults)
+    return Viewer(scene, viser_scene, controls, thread, faults)

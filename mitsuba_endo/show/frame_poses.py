@@ -21,7 +21,7 @@ _PARALLEL = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class FramePoses:
     """Where one frame's camera and projector are; None where that could not be determined."""
 
     name: str
@@ -29,7 +29,7 @@ class Place:
     first_from_projector: RigidTransform | None
 
 
-def places(solution: Solution) -> list[Place]:
+def frame_poses(solution: Solution) -> list[FramePoses]:
     """Return the places of all frames, lengths in the solution's unit."""
     first = solution.frames[0].world_from_camera.to_transform()
     out = []
@@ -40,7 +40,7 @@ def places(solution: Solution) -> list[Place]:
         pose = frame.projector_from_camera.to_transform()
         seen = None if camera is None or first is None else first.inverse() @ camera
         lit = None if seen is None or pose is None else seen @ pose.inverse()
-        out.append(Place(frame.name, seen, lit))
+        out.append(FramePoses(frame.name, seen, lit))
     return out
 
 
@@ -103,20 +103,20 @@ class Rays:
 
 
 def correspondence_rays(
-    solution: Solution, camera: CameraModel, maps: FrameMaps, place: Place, count: int
+    solution: Solution, camera: CameraModel, maps: FrameMaps, at: FramePoses, count: int
 ) -> Rays | None:
     """Return about ``count`` used correspondences, evenly spread over the image.
 
     None where the projector is not known. The observed coordinates are drawn, not the rendered.
     """
     model = frame_projector(solution, solution.frames[_index(solution, maps.name)])
-    if model is None or place.first_from_camera is None or place.first_from_projector is None:
+    if model is None or at.first_from_camera is None or at.first_from_projector is None:
         return None
     pixels = _spread(maps.used, count)
     q = maps.observed[pixels[:, 1], pixels[:, 0]].astype(np.float64)
-    a = place.first_from_camera.rotate(camera.rays(pixels.astype(float)))
-    b = place.first_from_projector.rotate(model.unproject(q))
-    between = place.first_from_projector.t - place.first_from_camera.t
+    a = at.first_from_camera.rotate(camera.rays(pixels.astype(float)))
+    b = at.first_from_projector.rotate(model.unproject(q))
+    between = at.first_from_projector.t - at.first_from_camera.t
     # Nearest points of the lines s a and between + u b.
     cosine = np.sum(a * b, -1)
     sine2 = np.maximum(1 - cosine**2, _PARALLEL**2)
@@ -126,7 +126,7 @@ def correspondence_rays(
     ends = [
         np.stack([np.broadcast_to(origin, d.shape), origin + length[:, None] * d], 1)[kept]
         for origin, d, length in (
-            (place.first_from_camera.t, a, s), (place.first_from_projector.t, b, u),
+            (at.first_from_camera.t, a, s), (at.first_from_projector.t, b, u),
         )
     ]  # fmt: skip
     return Rays(pixels[kept], *ends)

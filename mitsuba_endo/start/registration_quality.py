@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .icp import Match, jacobian, match, sample
-from .range_image import Frame
+from .range_image import RangePyramid
 from .similarity import Similarities
 
 # The gate. On 240 neighbouring pairs of random sheets, stomachs and colons right placements have a
@@ -32,7 +32,7 @@ AMBIGUOUS = "another placement fits about as well (overlap too small, flat or re
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RegistrationQuality:
     """How well two frames agree under one placement, taken over both directions."""
 
     residual: float
@@ -57,12 +57,14 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class PairRegistration:
     """The best placement of a source frame in a target frame."""
 
     target_from_source: Similarities = field(default_factory=Similarities.identity)
     """One transform, in the common unit."""
-    fit: Fit = field(default_factory=lambda: Fit(np.inf, (0.0, 0.0), 1.0, 0.0, np.inf))
+    fit: RegistrationQuality = field(
+        default_factory=lambda: RegistrationQuality(np.inf, (0.0, 0.0), 1.0, 0.0, np.inf)
+    )
     runner_up: float = 1.0
     """Score of the next distinct placement over that of the best one, at least 1."""
 
@@ -71,19 +73,21 @@ class Pair:
         """Why the placement cannot be trusted; empty if it can."""
         return self.fit.fault or ("" if self.runner_up >= MIN_RUNNER_UP else AMBIGUOUS)
 
-    def inverse(self) -> "Pair":
+    def inverse(self) -> "PairRegistration":
         """Return the placement of the target in the source."""
         fit = replace(self.fit, overlap=self.fit.overlap[::-1])
-        return Pair(self.target_from_source.inverse(), fit, self.runner_up)
+        return PairRegistration(self.target_from_source.inverse(), fit, self.runner_up)
 
 
-def judge(pose: Similarities, target: Frame, source: Frame, rng: np.random.Generator) -> Fit:
+def judge(
+    pose: Similarities, target: RangePyramid, source: RangePyramid, rng: np.random.Generator
+) -> RegistrationQuality:
     """Compare the two frames under one placement, in both directions."""
     there = match(pose, sample(source.fine, JUDGED_POINTS, rng), target.fine, GATE_SCALE)
     back = match(pose.inverse(), sample(target.fine, JUDGED_POINTS, rng), source.fine, GATE_SCALE)
     residual = max(_residual(there), _residual(back))
     partners, seen = there.partner.sum() + back.partner.sum(), there.seen.sum() + back.seen.sum()
-    return Fit(
+    return RegistrationQuality(
         residual,
         (float(there.partner.mean()), float(back.partner.mean())),
         1 - float(partners) / max(float(seen), 1.0),

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from ...geometry.transforms import RigidTransform
 from ...records.calibration import Snapshot, SurfaceEstimate
 from ..colours import CAMERA, MISSING, PROJECTOR
-from ..content import Content
-from ..places import Floats, Place, camera_corners, pyramid, solution_corners
+from ..frame_poses import Floats, FramePoses, camera_corners, pyramid, solution_corners
+from ..result_scene import ResultScene
 from ..surface_colours import Shown
 from .choice import Choice
 from .nodes import Nodes, rgb_bytes
@@ -20,14 +20,14 @@ COARSE = "#9fb4c4"
 _TEXELS = 256
 
 
-class Stage:
-    """Draws a content on a viser server; nodes that do not change stay."""
+class ViserScene:
+    """Draws a scene on a viser server; nodes that do not change stay."""
 
-    def __init__(self, server: Any, content: Content) -> None:
-        self.server, self.content = server, content
+    def __init__(self, server: Any, scene: ResultScene) -> None:
+        self.server, self.scene = server, scene
         self.nodes = Nodes(server)
         light(server)
-        look_from(server, content.calibration.surface.vertices)
+        look_from(server, scene.calibration.surface.vertices)
 
     def draw(self, choice: Choice) -> None:
         """Show what is chosen and nothing else."""
@@ -35,22 +35,20 @@ class Stage:
             if choice.snapshot is None:
                 self._result(choice)
             else:
-                self._snapshot(self.content.calibration.history[choice.snapshot], choice)
+                self._snapshot(self.scene.calibration.history[choice.snapshot], choice)
             if choice.truth:
                 self._truth(choice)
 
     def shown_surfaces(self, choice: Choice) -> list[int]:
         """Return the indices of the surfaces that are shown."""
-        if len(self.content.surfaces) == 1:
+        if len(self.scene.surfaces) == 1:
             return [0]
-        return (
-            [choice.frame] if choice.frame is not None else list(range(len(self.content.surfaces)))
-        )
+        return [choice.frame] if choice.frame is not None else list(range(len(self.scene.surfaces)))
 
     def _result(self, choice: Choice) -> None:
-        content = self.content
+        scene = self.scene
         if choice.surface:
-            quantities = content.quantities()
+            quantities = scene.quantities()
             shown = next((q for q in quantities if q.name == choice.colour), quantities[0])
             for k in self.shown_surfaces(choice):
                 self.nodes.put(
@@ -58,7 +56,7 @@ class Stage:
                 )
         for k in self._frames(choice):
             if choice.frusta:
-                self._frusta(f"/frame_{k}", k, content.places[k])
+                self._frusta(f"/frame_{k}", k, scene.poses[k])
             if choice.rays:
                 self._rays(k)
 
@@ -69,54 +67,54 @@ class Stage:
                 put_snapshot_surface(self.nodes, snapshot, s)
         if choice.frusta:
             for k in self._frames(choice):
-                self._frusta(f"/iteration/frame_{k}", k, snapshot_place(snapshot, k))
+                self._frusta(f"/iteration/frame_{k}", k, snapshot_poses(snapshot, k))
 
     def _truth(self, choice: Choice) -> None:
-        truth = self.content.truth
+        truth = self.scene.truth
         if truth is None:
             return
-        scene, surface = self.server.scene, truth.surface
+        viser, surface = self.server.scene, truth.surface
         if surface is not None:
             self.nodes.put(
                 "/truth/surface", 0,
-                lambda name: scene.add_mesh_simple(
+                lambda name: viser.add_mesh_simple(
                     name, surface.vertices, surface.faces, color=rgb_bytes(TRUTH), opacity=0.25,
                     side="double",
                 ),
             )  # fmt: skip
         if choice.frusta:
             for k in self._frames(choice):
-                self._frusta(f"/truth/frame_{k}", k, truth.places[k], TRUTH)
+                self._frusta(f"/truth/frame_{k}", k, truth.poses[k], TRUTH)
 
     def _frames(self, choice: Choice) -> list[int]:
-        return list(range(len(self.content.places))) if choice.frame is None else [choice.frame]
+        return list(range(len(self.scene.poses))) if choice.frame is None else [choice.frame]
 
     def _mesh(self, name: str, surface: int, shown: Shown) -> Any:
-        mesh = coloured_mesh(self.content.surfaces[surface], shown, surface)
-        pose = self.content.first_from_surface(surface)
+        mesh = coloured_mesh(self.scene.surfaces[surface], shown, surface)
+        pose = self.scene.first_from_surface(surface)
         return self.server.scene.add_mesh_trimesh(
             name, mesh, wxyz=quaternion(pose), position=pose.t, cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
 
-    def _frusta(self, prefix: str, frame: int, place: Place, colour: str | None = None) -> None:
-        solution, camera = self.content.calibration.solution, self.content.calibration.camera
+    def _frusta(self, prefix: str, frame: int, at: FramePoses, colour: str | None = None) -> None:
+        solution, camera = self.scene.calibration.solution, self.scene.calibration.camera
         for kind, pose, own, corners in (
-            ("camera", place.first_from_camera, CAMERA, camera_corners(camera)),
+            ("camera", at.first_from_camera, CAMERA, camera_corners(camera)),
             (
-                "projector", place.first_from_projector, PROJECTOR,
+                "projector", at.first_from_projector, PROJECTOR,
                 solution_corners(solution, solution.frames[frame]),
             ),
         ):  # fmt: skip
             if pose is None:
                 continue
-            lines = pyramid(pose, corners, self.content.reach)
+            lines = pyramid(pose, corners, self.scene.reach)
             self.nodes.put_lines(f"{prefix}/{kind}", lines, colour or own)
             if colour is None:
                 self._label(f"{prefix}/{kind}_name", kind, pose)
 
     def _label(self, name: str, text: str, pose: RigidTransform) -> None:
-        below = pose.apply(np.array([0.0, 0.02, -0.02]) * self.content.distance)
+        below = pose.apply(np.array([0.0, 0.02, -0.02]) * self.scene.distance)
         self.nodes.put(
             name, below.tobytes(),
             lambda name: self.server.scene.add_label(
@@ -125,7 +123,7 @@ class Stage:
         )  # fmt: skip
 
     def _rays(self, frame: int) -> None:
-        rays = self.content.rays(frame)
+        rays = self.scene.rays(frame)
         if rays is None:
             return
         for kind, lines, colour in (
@@ -134,10 +132,10 @@ class Stage:
             self.nodes.put_lines(f"/rays_{frame}/{kind}", lines, colour, 1.0)
 
 
-def snapshot_place(snapshot: Snapshot, frame: int) -> Place:
+def snapshot_poses(snapshot: Snapshot, frame: int) -> FramePoses:
     """Return where a frame's camera and projector stood."""
     first = snapshot.world_from_camera[0].inverse() @ snapshot.world_from_camera[frame]
-    return Place("", first, first @ snapshot.projector_from_camera[frame].inverse())
+    return FramePoses("", first, first @ snapshot.projector_from_camera[frame].inverse())
 
 
 def coloured_mesh(surface: SurfaceEstimate, shown: Shown, index: int) -> trimesh.Trimesh:
@@ -152,8 +150,8 @@ def coloured_mesh(surface: SurfaceEstimate, shown: Shown, index: int) -> trimesh
 
     texels = np.concatenate([shown.strip(_TEXELS), [rgb_bytes(MISSING)]]).astype(np.uint8)
     share = shown.share(index)
-    place = np.where(np.isfinite(share), share * (_TEXELS - 1), _TEXELS)
-    uv = np.stack([(place + 0.5) / (_TEXELS + 1), np.full(len(place), 0.5)], -1)
+    texel = np.where(np.isfinite(share), share * (_TEXELS - 1), _TEXELS)
+    uv = np.stack([(texel + 0.5) / (_TEXELS + 1), np.full(len(texel), 0.5)], -1)
     material = PBRMaterial(
         baseColorTexture=Image.fromarray(texels[None]), metallicFactor=0.0, roughnessFactor=1.0,
         doubleSided=True,
@@ -169,7 +167,7 @@ def put_snapshot_surface(nodes: Nodes, snapshot: Snapshot, index: int) -> None:
     vertices, faces = snapshot.surfaces[index], snapshot.faces[index]
     pose = RigidTransform.identity()
     if len(snapshot.surfaces) > 1:
-        pose = snapshot_place(snapshot, index).first_from_camera or pose
+        pose = snapshot_poses(snapshot, index).first_from_camera or pose
     nodes.put(
         f"/iteration/surface_{index}", (snapshot.iteration, vertices.tobytes()),
         lambda name: nodes.server.scene.add_mesh_simple(

@@ -9,8 +9,8 @@ import numpy as np
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, SurfaceEstimate
 from . import surface_colours
-from .numbers import unit_name
-from .places import REACH, Floats, Place, Rays, correspondence_rays, places
+from .frame_poses import REACH, Floats, FramePoses, Rays, correspondence_rays, frame_poses
+from .solution_values import unit_name
 from .surface_colours import Shown
 from .truth import Truth, load_truth, surface_error
 
@@ -19,7 +19,7 @@ RAYS = 60
 
 
 @dataclass(eq=False)
-class Content:
+class ResultScene:
     """A calibration with what is derived from it for looking at."""
 
     calibration: Calibration
@@ -29,8 +29,8 @@ class Content:
     _rays: dict[int, Rays | None] = field(default_factory=dict)
 
     @cached_property
-    def places(self) -> list[Place]:
-        return places(self.calibration.solution)
+    def poses(self) -> list[FramePoses]:
+        return frame_poses(self.calibration.solution)
 
     @cached_property
     def surfaces(self) -> list[SurfaceEstimate]:
@@ -59,7 +59,7 @@ class Content:
         """Return where a surface lies in the first camera's frame."""
         if len(self.surfaces) == 1:
             return RigidTransform.identity()
-        return self.places[surface].first_from_camera or RigidTransform.identity()
+        return self.poses[surface].first_from_camera or RigidTransform.identity()
 
     def quantities(self) -> list[Shown]:
         """Return what the surfaces can be coloured by, the most telling first."""
@@ -77,7 +77,7 @@ class Content:
         if frame not in self._rays:
             known = self.calibration
             self._rays[frame] = correspondence_rays(
-                known.solution, known.camera, known.frames[frame], self.places[frame], RAYS
+                known.solution, known.camera, known.frames[frame], self.poses[frame], RAYS
             )
         return self._rays[frame]
 
@@ -99,7 +99,7 @@ class Content:
 def seen_from(truth: Truth, frame: int) -> SurfaceEstimate:
     """Return the true surface in the true frame of a frame's camera."""
     assert truth.surface is not None
-    pose = truth.places[frame].first_from_camera
+    pose = truth.poses[frame].first_from_camera
     if frame == 0 or pose is None:
         return truth.surface
     return SurfaceEstimate(pose.inverse().apply(truth.surface.vertices), truth.surface.faces)

@@ -10,7 +10,12 @@ from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Estimate, PoseEstimate
-from mitsuba_endo.show.places import correspondence_rays, places, pyramid, solution_corners
+from mitsuba_endo.show.frame_poses import (
+    correspondence_rays,
+    frame_poses,
+    pyramid,
+    solution_corners,
+)
 
 Maker = Callable[..., Calibration]
 
@@ -24,8 +29,8 @@ def test_rays_meet_on_the_surface(calibration: Calibration):
     """Oracle: rendered maps without noise: both rays end at one point of the sheet, and start at
     the second frame's camera and projector."""
     maps = replace(calibration.frames[1], observed=calibration.frames[1].rendered)
-    place = places(calibration.solution)[1]
-    rays = correspondence_rays(calibration.solution, calibration.camera, maps, place, 60)
+    at = frame_poses(calibration.solution)[1]
+    rays = correspondence_rays(calibration.solution, calibration.camera, maps, at, 60)
     assert rays is not None
     assert 40 < len(rays.pixels) < 130
     assert maps.used[rays.pixels[:, 1], rays.pixels[:, 0]].all()
@@ -48,9 +53,9 @@ def test_rays_meet_on_the_surface(calibration: Calibration):
 def test_noise_is_the_gap_of_the_rays(calibration: Calibration):
     """Oracle: q shifted across the epipolar lines by 3 px moves the projector's ray by that."""
     maps = calibration.frames[0]
-    place = places(calibration.solution)[0]
+    at = frame_poses(calibration.solution)[0]
     shifted = replace(maps, observed=maps.rendered + np.array([0, 3.0], np.float32))
-    rays = correspondence_rays(calibration.solution, calibration.camera, shifted, place, 60)
+    rays = correspondence_rays(calibration.solution, calibration.camera, shifted, at, 60)
     assert rays is not None
     gap = np.linalg.norm(rays.camera[:, 1] - rays.projector[:, 1], axis=1)
     far = np.linalg.norm(rays.projector[:, 1] - rays.projector[:, 0], axis=1)
@@ -64,15 +69,15 @@ def test_unknown_places_have_no_rays(calibration: Calibration):
     solution = calibration.solution.model_copy(
         update={"frames": [frame, *calibration.solution.frames[1:]]}
     )
-    place = places(solution)[0]
-    assert place.first_from_camera is not None
-    assert place.first_from_projector is None
+    at = frame_poses(solution)[0]
+    assert at.first_from_camera is not None
+    assert at.first_from_projector is None
     maps, camera = calibration.frames[0], calibration.camera
-    assert correspondence_rays(solution, camera, maps, place, 60) is None
+    assert correspondence_rays(solution, camera, maps, at, 60) is None
     focal = Estimate(value=None, status="unobservable", reason="one plane")
     projector = calibration.solution.projector.model_copy(update={"focal": focal})
     solution = calibration.solution.model_copy(update={"projector": projector})
-    assert correspondence_rays(solution, camera, maps, places(solution)[0], 60) is None
+    assert correspondence_rays(solution, camera, maps, frame_poses(solution)[0], 60) is None
     corners = solution_corners(solution, solution.frames[0])
     np.testing.assert_array_equal(corners, [[0, 0, 1]])
     edges = pyramid(RigidTransform.of([0, 0, 0], [1, 2, 3]), corners, 5.0)

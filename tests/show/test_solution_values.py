@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from mitsuba_endo.records.calibration import Calibration
-from mitsuba_endo.show.numbers import interval, rows
+from mitsuba_endo.show.solution_values import interval, rows
 
 
 @pytest.mark.parametrize(

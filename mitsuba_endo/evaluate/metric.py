@@ -1,0 +1,30 @@
+"""A metric that may be unknown, with the reason."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number, or the reason why there is none."""
+
+    value: float | None
+    reason: str | None = None
+
+    @classmethod
+    def unknown(cls, reason: str) -> "Metric":
+        return cls(None, reason)
+
+
+def rms(metrics: Sequence[Metric], names: Sequence[str]) -> Metric:
+    """Return the root mean square over the frames that have a value; the reason names the rest."""
+    known = [f.value for f in metrics if f.value is not None]
+    missing = [(n, f.reason) for n, f in zip(names, metrics, strict=True) if f.value is None]
+    reason = f"frame {missing[0][0]}: {missing[0][1]}" if missing else None
+    if not known:
+        return Metric.unknown(reason or "there are no frames")
+    if missing:
+        reason = f"over {len(known)} of {len(metrics)} frames ({reason})"
+    return Metric(float(np.sqrt(np.mean(np.square(known)))), reason)
