@@ -72,16 +72,16 @@ def _input(map_: str) -> Use:
 
 def _folder(folder: Path) -> None:
     """Read a solution folder whole, and what the viewer makes of it first."""
-    from mitsuba_endo.show.content import Content
-    from mitsuba_endo.show.numbers import headline
     from mitsuba_endo.show.read_folder import read_solution_folder
+    from mitsuba_endo.show.result_scene import ResultScene
+    from mitsuba_endo.show.solution_values import headline
 
     calibration = read_solution_folder(folder)
-    content = Content(calibration)
-    content.quantities()
+    scene = ResultScene(calibration)
+    scene.quantities()
     headline(calibration.solution)
     for k in range(len(calibration.frames)):
-        content.rays(k)
+        scene.rays(k)
 
 
 def _report(folder: Path) -> None:
