@@ -70,6 +70,13 @@ def _input(map_: str) -> Use:
     return use
 
 
+def _camera(name: str) -> Use:
+    def use(folder: Path) -> None:
+        _input("map.npz")(folder / name)
+
+    return use
+
+
 def _folder(folder: Path) -> None:
     """Read a solution folder whole, and what the viewer makes of it first."""
     from mitsuba_endo.show.read_folder import read_solution_folder
@@ -187,6 +194,8 @@ READERS: dict[str, Reader] = {
         Reader("camera yaml", _made("camera yaml"), "camera.yaml", _input("map.npz"), TEXT),
         Reader("camera xml", _made("camera xml"), "camera.xml", _input("map.npz"), TEXT),
         Reader("camera json", _made("camera json"), "camera.json", _input("map.npz"), TREES),
+        *(Reader(f"camera {n}", _made("cameras"), f"{n}/{n}.{suffix}", _camera(n), TEXT, 0.5)
+          for n, suffix in (("kalibr", "yaml"), ("ros", "yaml"), ("colmap", "txt"))),
         Reader("map exr", _made("inputs"), "map.exr", _input("map.exr"), BYTES, 2),
         Reader("map npz", _made("inputs"), "map.npz", _input("map.npz"), ARRAYS, 2),
         Reader("solution folder", _made("result"), "solution.json", _folder, TREES, 1),

@@ -70,6 +70,26 @@ def _camera(suffix: str) -> Any:
     return make
 
 
+CAMERAS = {
+    "kalibr.yaml": "cam0:\n  camera_model: pinhole\n  intrinsics: [30.0, 31.0, 11.0, 7.0]\n"
+    "  distortion_model: radtan\n  distortion_coeffs: [-0.1, 0.02, 0.0, 0.0]\n"
+    "  resolution: [24, 14]\n",
+    "ros.yaml": "image_width: 24\nimage_height: 14\ncamera_name: a\ncamera_matrix:\n  rows: 3\n"
+    "  cols: 3\n  data: [30.0, 0, 11.0, 0, 31.0, 7.0, 0, 0, 1]\ndistortion_model: plumb_bob\n"
+    "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.1, 0.02, 0, 0, 0]\n",
+    "colmap.txt": "# Camera list\n1 OPENCV 24 14 30.0 31.0 11.5 7.5 -0.1 0.02 0 0\n",
+}
+"""Camera files of other programs."""
+
+
+def _cameras(folder: Path) -> None:
+    for name, text in CAMERAS.items():
+        inside = folder / name.partition(".")[0]
+        inside.mkdir()
+        _inputs(inside, name)
+        (inside / name).write_text(text, encoding="utf-8")
+
+
 def _result(folder: Path) -> None:
     """Write what a calibration leaves, with a truth that is the result itself."""
     from mitsuba_endo import backend
@@ -163,6 +183,7 @@ MAKERS = {
     "camera yaml": _camera("yaml"),
     "camera xml": _camera("xml"),
     "camera json": _camera("json"),
+    "cameras": _cameras,
     "result": _result,
     "images": _images,
     "meshes": _meshes,

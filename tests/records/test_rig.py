@@ -266,7 +266,7 @@ GOOD = "400., 0., 210., 0., 395., 168., 0., 0., 1."
         (None, "no such file; check `camera` in the rig file"),
         ("hello", "is not an OpenCV FileStorage"),
         (HEADER + SIZE, "camera_matrix is missing"),
-        (HEADER + SIZE + "camera_matrix: 7\n", "holds a matrix that is none"),
+        (HEADER + SIZE + "camera_matrix: 7\n", "is not an OpenCV calibration"),
         (HEADER + MATRIX.format(GOOD), "image_width or image_height is missing"),
         (
             HEADER + SIZE + MATRIX.format(GOOD.replace("395.", ".Nan")),
