@@ -1,3 +1,4 @@
+import shutil
 from pathlib import Path
 
 import cv2
@@ -47,3 +48,12 @@ def test_a_caption_tells_number_kind_and_polyps():
     """Oracle: the text."""
     told = {"index": 7, "kind": "colon", "polyps": [{"diameter": 4.26}, {"diameter": 9.0}]}
     assert caption(Stored(told, {})) == "7  colon, polyps 4.3, 9.0 mm"
+
+
+def test_sheets_are_the_same_to_the_bit_wherever_the_dataset_lies(tmp_path: Path):
+    """Oracle: the bytes of a copy under another name, drawn again."""
+    make_here(small_config(), tmp_path / "one", 2)
+    shutil.copytree(tmp_path / "one", tmp_path / "other")
+    sheets = [write_contact_sheets(Dataset(tmp_path / name)) for name in ("one", "other")]
+    first, second = ([path.read_bytes() for path in paths] for paths in sheets)
+    assert first == second
