@@ -42,13 +42,13 @@ class Patient:
         started = time.monotonic()
         run(folder, *command.arguments)
         self.seconds = time.monotonic() - started
-        self.whole = _contents(folder / command.out)
+        self.whole = contents(folder / command.out)
 
     def kill(self, rng: np.random.Generator) -> bool:
         """Start the command, send a signal at some moment; tell whether it was alive then."""
         if rng.random() < 0.5:
             self._forget()
-        before = _contents(self.folder / self.command.out)
+        before = contents(self.folder / self.command.out)
         number = SIGNALS[int(rng.integers(len(SIGNALS)))]
         process = start(self.folder, self.command.arguments)
         # Half of them near the end, where the writing is.
@@ -76,11 +76,11 @@ class Patient:
     def end(self) -> None:
         """Run the command once more and see that nothing is left over."""
         run(self.folder, *self.command.arguments)
-        left = _litter(self.folder)
+        left = leftovers(self.folder)
         if left:
             self.faults.append(f"left over after the next run: {left}")
         if self._is_dataset:
-            now = _contents(self.folder / self.command.out)
+            now = contents(self.folder / self.command.out)
             other = [k for k in {*now, *self.whole} if now.get(k) != self.whole.get(k)]
             if other:
                 self.faults.append(f"differs from the uninterrupted one in {sorted(other)[:5]}")
@@ -98,8 +98,8 @@ class Patient:
         if struck and number is not signal.SIGKILL:
             if code not in (0, 1, INTERRUPTED):
                 self.faults.append(f"{how}: exit code {code}: {said[-200:]!r}")
-            if _litter(self.folder) and code == INTERRUPTED:
-                self.faults.append(f"{how}: left {_litter(self.folder)}")
+            if leftovers(self.folder) and code == INTERRUPTED:
+                self.faults.append(f"{how}: left {leftovers(self.folder)}")
         fault = self._state(before)
         if fault:
             self.faults.append(f"{how}: {fault}")
@@ -107,7 +107,7 @@ class Patient:
     def _state(self, before: dict[str, bytes]) -> str | None:
         """Return what is wrong with the output: it is absent, as before, or complete."""
         out = self.folder / self.command.out
-        now = _contents(out)
+        now = contents(out)
         if self._is_dataset:  # each sample is absent or complete
             samples = out / "samples"
             folders = [p for p in samples.glob("[0-9]*") if p.is_dir()] if samples.exists() else []
@@ -134,7 +134,8 @@ def _cut(now: dict[str, bytes], whole: dict[str, bytes]) -> str | None:
     return None if sizes[0] == sizes[1] else f"{sizes[0]} bytes instead of {sizes[1]}"
 
 
-def _contents(path: Path) -> dict[str, bytes]:
+def contents(path: Path) -> dict[str, bytes]:
+    """Return the files of a folder, or the one file, by their paths in it."""
     if path.is_file():
         return {"": path.read_bytes()}
     return {
@@ -144,7 +145,8 @@ def _contents(path: Path) -> dict[str, bytes]:
     }
 
 
-def _litter(folder: Path) -> list[str]:
+def leftovers(folder: Path) -> list[str]:
+    """Return what is half written in a folder and below."""
     found = {p for form in LITTER for p in folder.rglob(form)}
     return sorted(str(p.relative_to(folder)) for p in found)
 

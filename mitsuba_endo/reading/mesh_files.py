@@ -6,6 +6,7 @@ PLY: http://paulbourke.net/dataformats/ply. STL: a header of 80 bytes, the numbe
 
 import io
 import struct
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -43,8 +44,10 @@ def read_mesh(path: str | Path) -> Any:
     try:
         _check_header(data, kind)
         # From memory: trimesh would read whatever file an OBJ's material names.
-        mesh: Any = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
-        vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of NumPy, about numbers that are refused below
+            mesh: Any = trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
+            vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
     except Exception:  # trimesh's readers raise whatever the damaged file leads them to
         raise InputError("is not a readable mesh", str(path), "make it again") from None
     _check(vertices, faces, str(path))

@@ -35,12 +35,21 @@ def validate(model: type[R], data: dict[str, Any], source: str) -> R:
         return model.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
-        path = [str(p) for p in first["loc"] if not _is_union_tag(p)]
+        path = _path(first)
         field = f"{source}: {'.'.join(path)}" if path else source
         raise InputError(*_explain(model, first, path, field)) from None
 
 
 _SYMBOLS = {"K", "R", "K_std"}  # the only capitalised keys of our files
+
+
+def _path(error: Any) -> list[str]:
+    """Return the keys that lead to an error, the last one as it stands in the file."""
+    keys = list(error["loc"])
+    named = keys[-1:] if error["type"] in ("extra_forbidden", "missing") else []
+    return [str(key) for key in keys[: len(keys) - len(named)] if not _is_union_tag(key)] + [
+        str(key) for key in named
+    ]
 
 
 def _is_union_tag(part: object) -> bool:

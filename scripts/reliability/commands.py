@@ -71,7 +71,8 @@ def _configuration(folder: Path) -> None:
     shutil.copy(sound("dataset files") / "config.yaml", folder / "config.yaml")
 
 
-def _dataset(count: int, form: str) -> Command:
+def dataset_command(count: int, form: str) -> Command:
+    """Return the command that makes so many samples in a format."""
     arguments = (
         "dataset",
         "config.yaml",
@@ -97,8 +98,8 @@ COMMANDS: dict[str, Command] = {
                 ("decode", "capture/image.png", "--rig", "capture/rig.yaml", "--out", "out"),
                 "out", _photograph),
         Command("report", ("report", "result", "--out", "report.html"), "report.html", _result),
-        _dataset(30, "files"),
-        _dataset(30, "hdf5"),
+        dataset_command(30, "files"),
+        dataset_command(30, "hdf5"),
     )
 }  # fmt: skip
 """By name."""

@@ -141,3 +141,13 @@ def test_empty_folder(tmp_path: Path):
     """Oracle: a sentence that names the file looked for."""
     with pytest.raises(InputError, match=r"solution\.json: no such file"):
         load_solution(tmp_path)
+
+
+@pytest.mark.parametrize("key", ["[[[", "Float", "float", "list[int]"])
+def test_unknown_keys_of_any_name_are_told(tmp_path: Path, key: str):
+    """Oracle: the key itself. Some look like what pydantic adds to the path of an error."""
+    data = {**json.loads(_solution().model_dump_json(by_alias=True)), key: 1}
+    (tmp_path / "s.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match="unknown key") as caught:
+        load_solution(tmp_path / "s.json")
+    assert str(caught.value.where).endswith(f"s.json: {key}")
