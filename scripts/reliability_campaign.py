@@ -2,7 +2,7 @@
 
 python -m scripts.reliability_campaign --count 10000 --seed 1 --out reliability-output
 
-Every attempt runs in a process of its own kind, which is ended after ten seconds. What is wanted:
+Every attempt runs in a process that may die, and is ended when it does not answer. What is wanted:
 no exception but ``InputError``, no death by a signal, no hang, and less than 2 GiB of memory. One
 attempt alone: ``--only "map npz" --seed 17 --count 1``.
 """
@@ -25,6 +25,9 @@ from scripts.reliability.readers import READERS
 from scripts.reliability.sound import VARIABLE
 
 HANG_S = 10.0
+"""Of the processor's time: the machine may have other work."""
+WAIT_S = 60.0
+"""Seconds without an answer after which a process is ended."""
 MOST_MIB = 2048
 RECYCLED = 400
 """Attempts after which a process is replaced, and so its peak of memory."""
@@ -47,7 +50,7 @@ class Attempts:
         process = self._running()
         assert process.stdin is not None
         assert process.stdout is not None
-        patience = HANG_S if name in self._seen else WARM_S
+        patience = WAIT_S if name in self._seen else WARM_S
         process.stdin.write(f"{name} {seed}\n")
         process.stdin.flush()
         self._left -= 1
@@ -62,7 +65,7 @@ class Attempts:
         code = process.returncode
         ended = "hang" if not answered else "death"
         return {"reader": name, "seed": seed, "ended": ended, "said": f"exit code {code}",
-                "seconds": patience if not answered else 0.0, "peak_mib": 0}  # fmt: skip
+                "seconds": patience if not answered else 0.0, "cpu": 0.0, "peak_mib": 0}  # fmt: skip
 
     def end(self) -> None:
         """End the process."""
@@ -101,7 +104,7 @@ def plan(count: int, only: str | None) -> list[str]:
 
 def bad(result: dict[str, Any]) -> bool:
     """Tell whether an attempt ended as none must."""
-    slow = result["seconds"] > HANG_S
+    slow = result["cpu"] > HANG_S
     return result["ended"] not in ("read", "refused") or slow or result["peak_mib"] > MOST_MIB
 
 
@@ -127,7 +130,7 @@ def main(
     with atomic_path(out / "results.json") as aside:
         aside.write_text(json.dumps(results, indent=0), encoding="utf-8")
     ended = Counter(r["ended"] for r in results)
-    slowest = max(r["seconds"] for r in results)
+    slowest = max(r["cpu"] for r in results)
     peak = max(r["peak_mib"] for r in results)
     typer.echo(
         f"{len(results)} files in {time.monotonic() - started:.0f} s: {dict(ended)}; slowest "

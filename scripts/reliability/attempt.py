@@ -27,7 +27,7 @@ def attempt(reader: Reader, seed: int, folder: Path) -> dict[str, object]:
     path = folder / reader.file
     how, spoilt = spoil(reader, seed, path.read_bytes())
     path.write_bytes(spoilt)
-    started = time.monotonic()
+    started, busy = time.monotonic(), time.process_time()
     result: dict[str, object] = {"reader": reader.name, "seed": seed, "how": how}
     try:
         reader.use(folder)
@@ -40,7 +40,8 @@ def attempt(reader: Reader, seed: int, folder: Path) -> dict[str, object]:
         where = traceback.format_exc().splitlines()[-6:]
         result |= {"ended": "fault", "said": f"{type(error).__name__}: {error}"[:600]}
         result["where"] = where
-    return result | {"seconds": time.monotonic() - started}
+    seconds, cpu = time.monotonic() - started, time.process_time() - busy
+    return result | {"seconds": seconds, "cpu": cpu}
 
 
 def spoil(reader: Reader, seed: int, data: bytes) -> tuple[str, bytes]:
