@@ -63,9 +63,10 @@ class Attempts:
             return json.loads(line)
         self.end()
         code = process.returncode
-        ended = "hang" if not answered else "death"
+        ended = "death" if answered else "hang"
+        seconds = 0.0 if answered else patience
         return {"reader": name, "seed": seed, "ended": ended, "said": f"exit code {code}",
-                "seconds": patience if not answered else 0.0, "cpu": 0.0, "peak_mib": 0}  # fmt: skip
+                "seconds": seconds, "cpu": 0.0, "peak_mib": 0}  # fmt: skip
 
     def end(self) -> None:
         """End the process."""

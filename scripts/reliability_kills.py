@@ -176,7 +176,8 @@ def main(
         patient.end()
         faults += [f"{command.name}: {fault}" for fault in patient.faults]
         typer.echo(f"{command.name}: {hits[command.name]} kills, {len(patient.faults)} faults")
-    typer.echo("\n".join(faults))
+        for fault in patient.faults:
+            typer.echo(f"  {fault}")
     typer.echo(f"{sum(hits.values())} kills of a live process, {len(faults)} faults.")
     sys.exit(1 if faults else 0)
 
