@@ -35,7 +35,7 @@ def turned_map(degrees: float) -> CorrespondenceMap:
     scene = make_scene(*SIZE)
     axis = np.array([0.3, -0.3, 1.0]) / np.linalg.norm([0.3, -0.3, 1.0])
     pose = RigidTransform.of(np.radians(degrees) * axis, np.zeros(3)) @ scene.true_pose
-    rays = scene.camera.rays(scene.camera.pixel_grid())
+    rays = scene.camera.grid_rays
     law = projector_model("pinhole", TRUE_FOCAL, CENTRE)
     q = law.project(pose.apply(scene.true_range[..., None] * rays))
     noise = NOISE_PX * np.random.default_rng(0).standard_normal(q.shape)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.transforms import RigidTransform
-
 Floats = NDArray[np.float64]
 
 
@@ -23,10 +21,6 @@ class Similarity:
     @classmethod
     def identity(cls) -> "Similarity":
         return cls(1.0, np.eye(3), np.zeros(3))
-
-    @classmethod
-    def rigid(cls, transform: RigidTransform) -> "Similarity":
-        return cls(1.0, transform.R, transform.t)
 
     def apply(self, points: Floats) -> Floats:
         """Transform points (..., 3)."""

@@ -48,5 +48,5 @@ def range_image(caster: RayCaster, camera: CameraModel) -> Floats:
 
     The mesh is in the camera's frame.
     """
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.grid_rays
     return caster.range(np.zeros(3), rays.reshape(-1, 3)).reshape(rays.shape[:2])

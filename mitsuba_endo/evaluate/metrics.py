@@ -4,8 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..files import atomic_path
-from ..reading.trees import read_json
-from ..records.validation import Record, validate
+from ..records.validation import Record
 from .shape import Alignment
 
 
@@ -64,12 +63,3 @@ class Metrics(Record):
         """Write ``metrics.json``."""
         with atomic_path(path) as aside:
             aside.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
-
-
-def load_metrics(path: str | Path) -> Metrics:
-    """Read ``metrics.json``.
-
-    Raises:
-        InputError: names the file and field.
-    """
-    return validate(Metrics, read_json(path), str(path))

@@ -102,7 +102,7 @@ def alignment_of(
     both = np.isfinite(found) & np.isfinite(true)
     if np.count_nonzero(both) < 3:
         return "no camera ray meets both surfaces, so they cannot be aligned"
-    rays = camera.rays(camera.pixel_grid())[both]
+    rays = camera.grid_rays[both]
     return align_robustly(
         rays * found[both, None], rays * true[both, None],
         scale=alignment != "rigid", rotation=alignment != "scale",
@@ -116,7 +116,7 @@ def _reached(
     seen = np.isfinite(true_range)
     if lighting is None:
         return seen
-    points = camera.rays(camera.pixel_grid())[seen] * true_range[seen, None]
+    points = camera.grid_rays[seen] * true_range[seen, None]
     q = lighting.projector.project(lighting.projector_from_camera.apply(points))
     on_pattern = ((q >= -0.5) & (q <= np.array(lighting.size) - 0.5)).all(-1)
     centre = lighting.projector_from_camera.inverse().t

@@ -32,7 +32,7 @@ class SurfaceView:
 
 def view_surface(surface: SurfaceEstimate, camera: CameraModel) -> SurfaceView:
     """Cast every pixel's ray at a surface in the camera's frame."""
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.grid_rays
     flat = rays.reshape(-1, 3)
     distance, triangle = RayCaster(surface.vertices, surface.faces).meet(np.zeros(3), flat)
     seen = np.isfinite(distance)

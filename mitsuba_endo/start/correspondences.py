@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
-
-MIN_CORRESPONDENCES = 50
+from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES
 
 
 @dataclass(frozen=True, eq=False)

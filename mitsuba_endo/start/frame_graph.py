@@ -1,6 +1,6 @@
 """The graph of frames and of the placements found between them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -36,12 +36,9 @@ class ChainedFrame:
 class FrameGraph:
     """Frames as nodes and trusted placements as edges; grows by :meth:`connect`."""
 
-    def __init__(
-        self, frames: list[RangePyramid], rng: np.random.Generator, say: Callable[[str], None]
-    ) -> None:
+    def __init__(self, frames: list[RangePyramid], rng: np.random.Generator) -> None:
         self.frames = frames
         self._rng = rng
-        self._say = say
         self._pairs: dict[tuple[int, int], PairRegistration] = {}
         """Every placement tried, by (target, source) with target < source."""
         self._faults: dict[tuple[int, int], str] = {}
@@ -105,7 +102,6 @@ class FrameGraph:
 
     def _try(self, j: int, k: int) -> bool:
         """Search for the placement of frame ``k`` in frame ``j``; tell whether it is trusted."""
-        self._say(f"Registering frame {k} to frame {j}")
         pair = register_pair(self.frames[j], self.frames[k], self._rng)
         self._pairs[j, k] = pair
         self._faults[j, k] = pair.fault

@@ -5,7 +5,7 @@ A frame that fits nowhere is reported with the reason, never joined: one wrong f
 joint solve.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +48,6 @@ def register_frames(
     images: Sequence[RangeImage],
     *,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
 ) -> list[Registration]:
     """Place all frames in one world.
 
@@ -59,7 +58,6 @@ def register_frames(
     Args:
         images: range images, each in its own unit (its baseline).
         seed: fixes the random starts and samples; the same seed gives the same result.
-        progress: called with the name of each step.
 
     Returns:
         One registration for each image, in order.
@@ -77,7 +75,7 @@ def register_frames(
         raise InputError(
             "no frame has a usable range image", todo="check the correspondence maps of the frames"
         )
-    graph = FrameGraph(frames, np.random.default_rng(seed), progress or (lambda _: None))
+    graph = FrameGraph(frames, np.random.default_rng(seed))
     graph.connect()
     graph.check_loops()
     return _collect(graph, unit)

@@ -1,7 +1,5 @@
 """The default start: a search over focal length and relative pose that needs no guess."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +34,6 @@ def search_start(
     focal_guess: float | None = None,
     search_centre: bool = False,
     seed: int = 0,
-    progress: Callable[[str], None] | None = None,
 ) -> Start:
     """Find projector pose, focal length and depth from one correspondence map.
 
@@ -55,19 +52,16 @@ def search_start(
         search_centre: look for the projector's centre along the pattern's height, for a lens whose
             centre is not given; see :mod:`.lens_shift`.
         seed: of the samples drawn.
-        progress: called with the name of each step.
 
     Raises:
         InputError: fewer than 50 usable correspondences, a map that spans less than 2 pattern
             pixels, no calibration with consistent depth and small residuals, a map and camera of
             different size, or a fixed focal length that is not positive.
     """
-    say = progress or (lambda _: None)
     rng = np.random.default_rng(seed)
     q = checked_map(q, camera)
     _check_focal(projector, refine_focal, focal_guess)
 
-    say("clean the map")
     usable = clean_map(q)
     data = gather(q, usable, camera)
     _check_extent(data)
@@ -77,7 +71,6 @@ def search_start(
 
     noise, notes, known = noise_scale(q, usable), [], []
     if search_centre:
-        say("search for the projector's centre")
         shift = find_lens_shift(
             [FrameSamples(few, some, noise)], projector, size, refine_focal=refine_focal,
             focal_guess=focal_guess,
@@ -85,16 +78,12 @@ def search_start(
         projector, notes = projector.with_(centre=shift.centre), [shift.note]
         known = [(s.pose, float(s.projector.focal)) for s in shift.states]
 
-    say("propose poses")
     focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
-    say("refine candidates")
     problem = RefinementProblem(projector, refine_focal, bounds, noise)
     minima = refine(problem, [*known, *((p.pose, p.focal) for p in proposals)], some)
-    say("finish")
     minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)
-    say("triangulate")
     found = minima[0].state
     shape = (camera.height, camera.width)
     seen = depth_image(evaluate(found.pose, found.projector, data), data, shape)

@@ -107,7 +107,7 @@ def shape_rmse(scene: Scene, found: Calibration) -> float:
 def point_errors(scene: Scene, peer: Adjusted) -> NDArray[np.float64]:
     """Return the distances (N,) of the peer's points from the truth, mm."""
     valid = scene.map.valid
-    rays = scene.camera.rays(scene.camera.pixel_grid())[valid]
+    rays = scene.camera.grid_rays[valid]
     return np.linalg.norm(peer.points - rays * scene.true_range[valid][:, None], axis=1)
 
 

@@ -57,7 +57,7 @@ def make_scene(width: int = 240, height: int = 240, seed: int = 0) -> Scene:
     K = [[400 / pixel, 0, (width - 1) / 2], [0, 400 / pixel, (height - 1) / 2], [0, 0, 1]]
     camera = Camera(width=width, height=height, K=K)
     model = camera.to_model()
-    rays = model.rays(model.pixel_grid())
+    rays = model.grid_rays
     distance = cast(BumpySheet(), rays)
     pose = RigidTransform.of([0.03, -0.12, 0.05], [-6.0, 1.0, 1.5])
     law = projector_model("pinhole", TRUE_FOCAL, CENTRE)

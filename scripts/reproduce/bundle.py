@@ -54,7 +54,7 @@ def adjust(q: Floats, camera: CameraModel, rig: Rig, plane: float, model: Model)
     assert rig.scale.baseline is not None
     assert rig.projector.focal.value is not None
     valid, baseline = np.isfinite(q).all(-1), rig.scale.baseline
-    seen, rays = q[valid].astype(np.float64), camera.rays(camera.pixel_grid())[valid]
+    seen, rays = q[valid].astype(np.float64), camera.grid_rays[valid]
     t = np.array([-baseline, 0.0, 0.0])
     start = projector_model(_LAW[model], rig.projector.focal.value, _centre(rig))
     problem = _reconstruction(camera, rig, model, seen, camera.pixel_grid()[valid], t)

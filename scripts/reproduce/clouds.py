@@ -33,7 +33,7 @@ def triangulated(inputs: Path, error: RigidTransform, truth: Truth) -> Floats:
     pose = error @ truth.projector_from_camera[0]
     start = known_start(maps[0].q, camera, rig.projector.to_model(), pose)
     depth = truth.baseline * start.depth[start.used]
-    return camera.rays(camera.pixel_grid())[start.used] * depth[:, None]
+    return camera.grid_rays[start.used] * depth[:, None]
 
 
 def cloud_image(surface: SurfaceEstimate, camera: CameraModel) -> Floats:
@@ -44,7 +44,7 @@ def cloud_image(surface: SurfaceEstimate, camera: CameraModel) -> Floats:
 def cloud(surface: SurfaceEstimate, truth: Truth) -> Floats:
     """Return the points (N, 3) of a surface on the first camera's rays."""
     found = cloud_image(surface, truth.camera)
-    rays = truth.camera.rays(truth.camera.pixel_grid())
+    rays = truth.camera.grid_rays
     return (rays * found[..., None])[np.isfinite(found)]
 
 
@@ -65,7 +65,7 @@ def frame_scale(found: Calibration, truth: Truth, frame: int) -> float:
     pose = found.solution.frames[at].world_from_camera.to_transform()
     assert pose is not None
     camera, true_pose = truth.camera, truth.world_from_camera[frame]
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.grid_rays
     ours = RayCaster(pose.inverse().apply(found.surface.vertices), found.surface.faces)
     true = RayCaster(true_pose.inverse().apply(truth.mesh.vertices), truth.mesh.faces)
     a, b = range_image(ours, camera), range_image(true, camera)

@@ -42,7 +42,7 @@ class Seen:
 def seen(surface: SurfaceEstimate, truth: Truth, alignment: Literal["rigid", "similarity"]) -> Seen:
     """Return the points of a surface on the first camera's rays and their errors."""
     camera = truth.camera
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.grid_rays
     true = range_image(RayCaster(truth.mesh.vertices, truth.mesh.faces), camera)
     found = range_image(RayCaster(surface.vertices, surface.faces), camera)
     both = np.isfinite(true) & np.isfinite(found)

@@ -47,7 +47,7 @@ def fuse(ranges: list[Floats], camera: CameraModel, how: Fusion) -> SurfaceEstim
     Returns:
         The surface in the first camera's frame, mm.
     """
-    rays = camera.rays(camera.pixel_grid())
+    rays = camera.grid_rays
     ranges = [_without_bridges(r, camera, how.steepest) for r in ranges]
     placed = register_frames([RangeImage(rays, r, camera) for r in ranges])
     clouds = [(rays * r[..., None])[np.isfinite(r)] for r in ranges]

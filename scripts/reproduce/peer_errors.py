@@ -42,7 +42,7 @@ def point_error(found: Found, truth: Truth, noise: Plain, seed: int) -> float:
 
     Pixels with a gross error and pixels for which a method gives no point do not count.
     """
-    rays = truth.camera.rays(truth.camera.pixel_grid())
+    rays = truth.camera.grid_rays
     gross = noise.gross((truth.camera.height, truth.camera.width), seed)
     kept = np.isfinite(found.ranges) & np.isfinite(exact_view(truth).q).all(-1) & ~gross
     kept &= np.abs(found.ranges) < 1e4  # points that ran off to infinity are no points

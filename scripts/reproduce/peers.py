@@ -96,7 +96,7 @@ def _bundle(inputs: Path, model: Model, plane: float) -> Found:
     began = perf_counter()
     found = adjust(map_.q, camera, rig, plane * _baseline(rig), model)
     ranges = np.full(map_.valid.shape, np.nan)
-    rays = camera.rays(camera.pixel_grid())[map_.valid]
+    rays = camera.grid_rays[map_.valid]
     ranges[map_.valid] = np.einsum("ni,ni->n", found.points, rays)
     return _found(found.focal, found.pose, ranges, began)
 

@@ -23,7 +23,7 @@ def shaded(
 ) -> NDArray[np.float64]:
     """Return a surface as a clay model lit from the camera (H, W), NaN where there is none."""
     pose = world_from_camera or RigidTransform.identity()
-    rays = pose.rotate(camera.rays(camera.pixel_grid()).reshape(-1, 3))
+    rays = pose.rotate(camera.grid_rays.reshape(-1, 3))
     distance, face = RayCaster(surface.vertices, surface.faces).meet(pose.t, rays)
     a, b, c = np.moveaxis(surface.vertices[surface.faces[face]], 1, 0)
     normal = np.cross(b - a, c - a)

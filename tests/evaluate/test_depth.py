@@ -15,7 +15,7 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]])
 def test_plane_seen_by_a_distorted_camera(llvm: str):
     """Oracle: ray and plane in closed form; the square's outline by its bounds in x and y."""
     found = range_image(RayCaster(SQUARE, FACES), CAMERA)
-    rays = CAMERA.rays(CAMERA.pixel_grid())
+    rays = CAMERA.grid_rays
     normal = np.cross(SQUARE[1] - SQUARE[0], SQUARE[3] - SQUARE[0])
     assert abs(normal @ (SQUARE[2] - SQUARE[0])) < 1e-9  # the fourth corner is in the plane
     expected = (normal @ SQUARE[0]) / (rays @ normal)

@@ -10,7 +10,7 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.evaluate.errors import evaluate, match_frames
-from mitsuba_endo.evaluate.metrics import load_metrics
+from mitsuba_endo.evaluate.metrics import Metrics
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.rig import Camera
@@ -124,7 +124,7 @@ def test_file_has_the_documented_keys(
         "focal_error_percent", "rotation_error_deg", "translation_direction_error_deg",
         "baseline_error_percent", "shape_rmse_mm", "shape_median_mm", "coverage",
     }  # fmt: skip
-    assert load_metrics(tmp_path / "metrics.json") == found
+    assert Metrics.model_validate_json((tmp_path / "metrics.json").read_text()) == found
 
 
 def test_unobservable_focal_is_null_with_reason(world: SimpleNamespace, folders: tuple[Path, Path]):

@@ -20,7 +20,7 @@ def _errors(found: ShapeErrors | str) -> ShapeErrors:
 
 def _tilted_points(world: SimpleNamespace, depth: float, slope: tuple[float, float]) -> np.ndarray:
     """(H, W, 3) points of the plane z = depth + slope . (x, y) on the camera's rays."""
-    rays = world.camera.rays(world.camera.pixel_grid())
+    rays = world.camera.grid_rays
     along = depth / (rays[..., 2] - slope[0] * rays[..., 0] - slope[1] * rays[..., 1])
     return rays * along[..., None]
 
@@ -33,7 +33,7 @@ def test_shifted_plane(world: SimpleNamespace):
     assert found.median == pytest.approx(0.1, rel=1e-9)
     points = _tilted_points(world, 70.1, (0, 0))
     on_patch = ((points[..., :2] > [-20, -15]) & (points[..., :2] < [18, 21])).all(-1)
-    expected = 0.1 / world.camera.rays(world.camera.pixel_grid())[on_patch][:, 2]
+    expected = 0.1 / world.camera.grid_rays[on_patch][:, 2]
     assert found.ray_rmse == pytest.approx(np.sqrt(np.mean(expected**2)), rel=1e-9)
     assert found.coverage == pytest.approx(on_patch.mean(), abs=1e-12)
     assert found.alignment_scale == 1

@@ -61,7 +61,7 @@ def _frame_maps(
 ) -> FrameMaps:
     """Maps of the frame ``pose`` = camera_from_first: rendered by ray casting, observed noisy."""
     caster = RayCaster(pose.apply(surface.vertices), surface.faces)
-    points = camera.rays(camera.pixel_grid()) * range_image(caster, camera)[..., None]
+    points = camera.grid_rays * range_image(caster, camera)[..., None]
     projector = projector_model(LAW, FOCAL, CENTRE, ASPECT, DISTORTION)
     rendered = projector.project(PROJECTOR_FROM_CAMERA.apply(points))
     rng = np.random.default_rng(seed)

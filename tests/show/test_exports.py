@@ -172,7 +172,7 @@ def _pinhole_map(calibration: Calibration, solution: Solution, frame: int) -> np
     assert model is not None
     surface, camera = calibration.surface, calibration.camera
     caster = RayCaster(world.inverse().apply(surface.vertices), surface.faces)
-    points = camera.rays(camera.pixel_grid()) * range_image(caster, camera)[..., None]
+    points = camera.grid_rays * range_image(caster, camera)[..., None]
     missing = ~np.isfinite(calibration.frames[frame].observed)
     return np.where(missing, np.nan, model.project(pose.apply(points)))
 

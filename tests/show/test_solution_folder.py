@@ -155,7 +155,7 @@ def test_wide_angle_scene_renders_the_same_coordinates(
     K = np.array([[25.0, 0, 30], [0, 26, 24], [0, 0, 1]])
     camera = CameraModel(model, 64, 46, K, coefficients)
     surface = calibration.surface
-    points = camera.rays(camera.pixel_grid())
+    points = camera.grid_rays
     points = points * range_image(RayCaster(surface.vertices, surface.faces), camera)[..., None]
     projector = calibration.solution.projector.to_model()
     pose = calibration.solution.frames[0].projector_from_camera.to_transform()

@@ -24,7 +24,7 @@ def test_plane(flip: bool):
     x, y, z = view.points[seen].T
     np.testing.assert_allclose(z, 64 + 0.1 * (x + 10) + 0.1 * y, rtol=1e-9)
     towards = view.points[seen] / np.linalg.norm(view.points[seen], axis=-1, keepdims=True)
-    np.testing.assert_allclose(towards, CAMERA.rays(CAMERA.pixel_grid())[seen], atol=1e-12)
+    np.testing.assert_allclose(towards, CAMERA.grid_rays[seen], atol=1e-12)
     normal = np.array([0.1, 0.1, -1]) / np.linalg.norm([0.1, 0.1, -1])
     np.testing.assert_allclose(view.normals[seen], np.tile(normal, (seen.sum(), 1)), atol=1e-6)
     assert view.std is not None

@@ -16,7 +16,7 @@ def rig():
 def test_is_a_plane_seen_by_a_front_parallel_projector(rig):
     """Oracle: depth times ray has z = distance; R = I, t the direction, f the given one."""
     start = plane_start(rig.q, rig.camera, rig.projector, distance=9.0, direction=(0, 2.0, 0))
-    points = start.depth[..., None] * rig.camera.rays(rig.camera.pixel_grid())
+    points = start.depth[..., None] * rig.camera.grid_rays
     np.testing.assert_allclose(points[start.used, 2], 9.0, rtol=1e-12)
     assert np.isnan(start.depth[~np.isfinite(rig.q[..., 0])]).all()
     np.testing.assert_array_equal(start.projector_from_camera.R, np.eye(3))
