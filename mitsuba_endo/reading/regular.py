@@ -13,8 +13,8 @@ VARIABLE = "MITSUBA_ENDO_LIMIT_"
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A kind of file, or what becomes of it in memory."""
+class SizeLimit:
+    """How large a kind of file, or what becomes of it in memory, may be."""
 
     name: str
     what: str
@@ -54,19 +54,19 @@ class Kind:
 
 
 # YAML is read at a third of a MiB a second.
-YAML = Kind("yaml", "a YAML file", 1)
-JSON = Kind("json", "a JSON file", 32)
-TABLE = Kind("table", "a table", 32)
-SCENE = Kind("scene", "a scene or OpenCV file", 16)
-MAP = Kind("map", "a map", 512)
-ARRAYS = Kind("arrays", "the arrays of a file", 512)
-IMAGE = Kind("image", "an image", 256)
-PIXELS = Kind("pixels", "an image in memory", 256)
-VIDEO = Kind("video", "a video", 65536)
-MESH = Kind("mesh", "a mesh", 256)
-NETWORK = Kind("network", "a network", 256)
-SHARD = Kind("shard", "a shard", 1 << 20)
-ANY = Kind("file", "a file", 2048)
+YAML = SizeLimit("yaml", "a YAML file", 1)
+JSON = SizeLimit("json", "a JSON file", 32)
+TABLE = SizeLimit("table", "a table", 32)
+SCENE = SizeLimit("scene", "a scene or OpenCV file", 16)
+MAP = SizeLimit("map", "a map", 512)
+ARRAYS = SizeLimit("arrays", "the arrays of a file", 512)
+IMAGE = SizeLimit("image", "an image", 256)
+PIXELS = SizeLimit("pixels", "an image in memory", 256)
+VIDEO = SizeLimit("video", "a video", 65536)
+MESH = SizeLimit("mesh", "a mesh", 256)
+NETWORK = SizeLimit("network", "a network", 256)
+SHARD = SizeLimit("shard", "a shard", 1 << 20)
+ANY = SizeLimit("file", "a file", 2048)
 
 
 def exists(path: str | Path) -> bool:
@@ -86,7 +86,7 @@ def is_file(path: str | Path) -> bool:
         return False
 
 
-def regular(path: str | Path, kind: Kind, missing: str = "no such file",
+def regular(path: str | Path, kind: SizeLimit, missing: str = "no such file",
             todo: str = "check the path") -> int:  # fmt: skip
     """Return the size of a file, bytes, that may be read.
 
@@ -107,7 +107,7 @@ def regular(path: str | Path, kind: Kind, missing: str = "no such file",
     return found.st_size
 
 
-def read_bytes(path: str | Path, kind: Kind, missing: str = "no such file",
+def read_bytes(path: str | Path, kind: SizeLimit, missing: str = "no such file",
                todo: str = "check the path") -> bytes:  # fmt: skip
     """Read a file whole.
 
@@ -124,7 +124,7 @@ def read_bytes(path: str | Path, kind: Kind, missing: str = "no such file",
     return data
 
 
-def read_text(path: str | Path, kind: Kind, todo: str = "check the path") -> str:
+def read_text(path: str | Path, kind: SizeLimit, todo: str = "check the path") -> str:
     """Read a text in UTF-8.
 
     Raises:

@@ -20,7 +20,7 @@ import pytest
 from mitsuba_endo.decode.image_files import read_image
 from mitsuba_endo.errors import InputError, shown
 from mitsuba_endo.reading.file_storage import read_file_storage
-from mitsuba_endo.reading.regular import IMAGE, MAP, Kind, is_file, read_bytes, regular
+from mitsuba_endo.reading.regular import IMAGE, MAP, SizeLimit, is_file, read_bytes, regular
 from mitsuba_endo.reading.trees import read_json, read_yaml
 from mitsuba_endo.reading.xml_guard import read_xml
 from mitsuba_endo.records.correspondence import load_map, read_exr, save_map, write_exr
@@ -102,7 +102,7 @@ def test_what_is_no_file_is_told(tmp_path: Path, name: str, way: str):
 
 def test_a_limit_can_be_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Oracle: the sentence's own advice, followed."""
-    kind, path = Kind("tested", "a test", 1), tmp_path / "a"
+    kind, path = SizeLimit("tested", "a test", 1), tmp_path / "a"
     path.write_bytes(bytes(2 << 20))
     with pytest.raises(InputError, match=r"MITSUBA_ENDO_LIMIT_TESTED=2 if it is right"):
         regular(path, kind)

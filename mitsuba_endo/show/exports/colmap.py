@@ -18,16 +18,16 @@ from ...reading.regular import is_file
 from ...records.solution import Solution
 from ...records.surface import load_surface
 from ..map_names import observed_names, own_surface_name
-from .known import (
+from .registry import register_exporter
+from .required_values import (
     camera_in,
     camera_pose,
-    known_camera,
-    known_projector,
-    known_size,
     pinhole_only,
     projector_pose,
+    required_camera,
+    required_projector,
+    required_size,
 )
-from .registry import register_exporter
 from .tracks import Sightings, sightings
 
 _PIXEL_CENTRE = 0.5
@@ -65,7 +65,7 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
 
 def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list[Sightings]]:
     """Return the vertices of all surfaces in the world's frame, and where every frame sees them."""
-    camera, frames = known_camera(solution), solution.frames
+    camera, frames = required_camera(solution), solution.frames
     poses = [camera_pose(frame) for frame in frames]
     own = [folder / own_surface_name(k) for k in range(1, len(frames))]
     paths = [folder / str(solution.surface), *(path for path in own if is_file(path))]
@@ -78,8 +78,8 @@ def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list
     for k, (frame, name) in enumerate(zip(frames, maps, strict=True)):
         surface = k if len(surfaces) > 1 else 0
         found = sightings(
-            surfaces[surface], frame, camera, known_projector(solution, frame), poses[k].inverse(),
-            projector_pose(frame), folder / name,
+            surfaces[surface], frame, camera, required_projector(solution, frame),
+            poses[k].inverse(), projector_pose(frame), folder / name,
         )  # fmt: skip
         seen.append(replace(found, points=found.points + starts[surface]))
     return np.concatenate(surfaces), seen
@@ -102,10 +102,10 @@ def _point_lines(points: NDArray[np.float64], seen: list[Sightings]) -> list[str
 
 def _cameras(solution: Solution) -> list[str]:
     """Return the camera as camera 1 and the projector of frame i as camera i + 2."""
-    lines = [_camera_line(known_camera(solution))]
-    width, height = known_size(solution)
+    lines = [_camera_line(required_camera(solution))]
+    width, height = required_size(solution)
     for i, frame in enumerate(solution.frames):
-        projector = known_projector(solution, frame)
+        projector = required_projector(solution, frame)
         values = _numbers(_projector_values(projector))
         lines.append(f"{i + 2} FULL_OPENCV {width} {height} {values}")
     return lines

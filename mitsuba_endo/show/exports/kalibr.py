@@ -11,16 +11,16 @@ from ...files import atomic_path
 from ...geometry.arrays import Array
 from ...geometry.cameras import CameraModel
 from ...records.solution import Solution
-from .known import (
+from .registry import register_exporter
+from .required_values import (
     camera_in,
-    known_camera,
-    known_projector,
-    known_size,
     metres,
     pinhole_only,
     projector_pose,
+    required_camera,
+    required_projector,
+    required_size,
 )
-from .registry import register_exporter
 
 _MODELS = {
     "opencv": "radtan", "opencv_fisheye": "equidistant", "omni": "radtan", "double_sphere": "none",
@@ -42,8 +42,8 @@ def write_kalibr(solution: Solution, folder: Path, path: Path) -> None:
             coefficient or the projector's law, or the file cannot be written.
     """
     pinhole_only(solution, "Kalibr")
-    camera, first = known_camera(solution), solution.frames[0]
-    projector, size = known_projector(solution, first), known_size(solution)
+    camera, first = required_camera(solution), solution.frames[0]
+    projector, size = required_projector(solution, first), required_size(solution)
     pose = projector_pose(first)
     T = pose.matrix()
     T[:3, 3] = metres(solution, pose)

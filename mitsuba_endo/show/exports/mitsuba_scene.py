@@ -10,8 +10,8 @@ from ...folder_mark import Kind
 from ...records.solution import Solution
 from ...records.surface import load_surface, save_surface
 from ..scene_file import save_scene
-from .known import known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
+from .required_values import projector_pose, required_camera, required_projector, required_size
 
 
 @register_exporter("mitsuba", "folder with scene.xml and surface.ply", Kind.SCENE)
@@ -24,8 +24,8 @@ def write_mitsuba(solution: Solution, folder: Path, path: Path) -> None:
     if solution.surface is None:
         raise InputError("surface is missing", "solution.json", "calibrate again")
     first = solution.frames[0]
-    camera, pose = known_camera(solution), projector_pose(first)
-    projector, size = known_projector(solution, first), known_size(solution)
+    camera, pose = required_camera(solution), projector_pose(first)
+    projector, size = required_projector(solution, first), required_size(solution)
     surface = load_surface(folder / solution.surface)
     distance = float(np.median(np.linalg.norm(surface.vertices, axis=-1)))
     with atomic_folder(path, Kind.SCENE) as aside:

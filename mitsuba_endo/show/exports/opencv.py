@@ -14,8 +14,15 @@ from ...geometry.cameras import CameraModel
 from ...geometry.laws import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...records.solution import Frame, Solution
-from .known import camera_in, camera_pose, known_camera, known_projector, known_size, projector_pose
 from .registry import register_exporter
+from .required_values import (
+    camera_in,
+    camera_pose,
+    projector_pose,
+    required_camera,
+    required_projector,
+    required_size,
+)
 
 _SUFFIXES = (".yaml", ".yml", ".xml", ".json")
 _MODELS = {"opencv": "calib3d", "opencv_fisheye": "fisheye", "omni": "omnidir"}
@@ -50,9 +57,9 @@ def write_opencv(solution: Solution, folder: Path, path: Path) -> None:
         raise InputError(
             f"unknown kind of file '{path.suffix}'", str(path), f"end it in {', '.join(_SUFFIXES)}"
         )
-    camera, size = known_camera(solution), known_size(solution)
+    camera, size = required_camera(solution), required_size(solution)
     poses = [(projector_pose(f), camera_pose(f)) for f in solution.frames]
-    projectors = [known_projector(solution, f) for f in solution.frames]
+    projectors = [required_projector(solution, f) for f in solution.frames]
     kind = camera_in(camera, _MODELS, "OpenCV")
     # In memory: to a full disk OpenCV writes half of it and says nothing.
     how = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY

@@ -14,17 +14,17 @@ from ...files import atomic_folder
 from ...folder_mark import Kind
 from ...geometry.arrays import Array
 from ...records.solution import Solution
-from .known import (
+from .opencv import projector_matrix
+from .registry import register_exporter
+from .required_values import (
     camera_in,
-    known_camera,
-    known_projector,
-    known_size,
     metres,
     pinhole_only,
     projector_pose,
+    required_camera,
+    required_projector,
+    required_size,
 )
-from .opencv import projector_matrix
-from .registry import register_exporter
 
 _MODELS = {"opencv": "plumb_bob", "opencv_fisheye": "equidistant"}
 _COUNTS = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}
@@ -45,10 +45,10 @@ def write_ros(solution: Solution, folder: Path, path: Path) -> None:
             projector's law, or the folder cannot be written.
     """
     pinhole_only(solution, "ROS")
-    camera, first = known_camera(solution), solution.frames[0]
+    camera, first = required_camera(solution), solution.frames[0]
     lens = camera_in(camera, _MODELS, "ROS")
     lens = "rational_polynomial" if lens == "plumb_bob" and any(camera.distortion[5:]) else lens
-    projector, size = known_projector(solution, first), known_size(solution)
+    projector, size = required_projector(solution, first), required_size(solution)
     pose = projector_pose(first).inverse()
     files = {
         "camera.yaml": _info(

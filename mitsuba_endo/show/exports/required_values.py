@@ -9,7 +9,7 @@ from ...records.solution import Frame, PoseEstimate, Solution
 _TODO = "capture what the verdict asks for and calibrate again"
 
 
-def known_camera(solution: Solution) -> CameraModel:
+def required_camera(solution: Solution) -> CameraModel:
     """Return the camera.
 
     Raises:
@@ -52,7 +52,7 @@ def metres(solution: Solution, pose: RigidTransform) -> list[float]:
     return (pose.t * (1e-3 if solution.units == "mm" else 1.0)).tolist()
 
 
-def known_projector(solution: Solution, frame: Frame) -> ProjectorModel:
+def required_projector(solution: Solution, frame: Frame) -> ProjectorModel:
     """Return the projector's intrinsics in a frame, which may have a focal length of its own.
 
     Raises:
@@ -71,7 +71,7 @@ def known_projector(solution: Solution, frame: Frame) -> ProjectorModel:
     return model
 
 
-def known_size(solution: Solution) -> tuple[int, int]:
+def required_size(solution: Solution) -> tuple[int, int]:
     """Return width and height of the pattern, pattern pixels.
 
     Raises:
