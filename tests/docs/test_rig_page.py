@@ -9,13 +9,14 @@ import yaml
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.rig import Camera, Rig
+from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.costs.gaussian_prior import gaussian_prior
 from mitsuba_endo.solve.frames.initialisation import start_frame
 from mitsuba_endo.solve.minimisers.minimise import minimiser_of
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
-from tests.solve.problems import map_of, small_rig
+from tests.solve.problems import map_of, rig_file, small_rig
 
 PAGE = (Path(__file__).parents[2] / "docs" / "rig.md").read_text("utf-8")
 SMALLEST = yaml.safe_load(PAGE.split("```yaml\n")[1].split("```")[0])
@@ -136,3 +137,16 @@ def test_the_old_name_of_the_solver_is_understood() -> None:
     assert type(new) is type(old)
     assert type(minimiser_of(Options(solver="adam"))) is not type(new)
     assert type(minimiser_of(Options())) is type(new)
+
+
+@pytest.mark.usefixtures("llvm")
+def test_a_mesh_is_for_frames_that_share_a_surface() -> None:
+    """Oracle: the same numbers to the last bit where there is but one frame."""
+    rig = small_rig("direction_cosine")
+    focals = [
+        calibrate(
+            [map_of(rig)], rig_file(rig), Options(jackknife=False, surface=surface)
+        ).solution.projector.focal
+        for surface in ("lattice", "mesh")
+    ]
+    assert focals[0] == focals[1]
