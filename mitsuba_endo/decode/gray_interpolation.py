@@ -23,6 +23,8 @@ ANYWHERE = np.float32(12**-0.5)
 """Standard deviation of a place that may be anywhere in a stripe, stripes."""
 WILD = np.float32(100)
 """Most noise of a way that is told from more."""
+TOGETHER = 1 << 20
+"""Pixels ranked at once, to save memory."""
 NEAR = 0.02
 """Share of the way between a stripe's edges over which the density of pixels is taken."""
 
@@ -111,16 +113,18 @@ def place_within(
             continue
         way, inside = distances.way[chosen], distances.inside[chosen]
         ranked = np.sort(way)
-
-        def below(value: NDArray[np.floating], ranked: NDArray[np.floating] = ranked):
-            return np.searchsorted(ranked, value) / np.float32(len(ranked))
-
-        density = (below(way + NEAR) - below(way - NEAR)) / (2 * NEAR)
-        # Of equal ones, the middle.
-        own = (below(way) + np.searchsorted(ranked, way, "right") / np.float32(len(ranked))) / 2
-        own_spread = density * distances.noise[chosen]
+        for part in np.array_split(np.arange(len(chosen)), -(-len(chosen) // TOGETHER)):
+            density = (_rank(ranked, way[part] + NEAR) - _rank(ranked, way[part] - NEAR)) / 2 / NEAR
+            place[chosen[part]] = _rank(ranked, way[part])
+            spread[chosen[part]] = density * distances.noise[chosen[part]]
         if inside.any():
             # Noise alone orders these: all lie somewhere in the stripe's middle part.
-            own[inside], own_spread[inside] = own[inside].mean(), inside.mean() * ANYWHERE
-        place[chosen], spread[chosen] = own, own_spread
+            place[chosen[inside]] = _rank(ranked, way[inside].mean())
+            spread[chosen[inside]] = inside.mean() * ANYWHERE
     return place, spread
+
+
+def _rank(ranked: NDArray[np.float32], value: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the share of sorted values that lie below; of equal ones, half do."""
+    below, above = (np.searchsorted(ranked, value, side) for side in ("left", "right"))
+    return ((below + above) / (2 * len(ranked))).astype(np.float32)

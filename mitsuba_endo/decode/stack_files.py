@@ -20,7 +20,7 @@ from .stack_images import Stack
 from .stack_patterns import patterns
 
 _LABEL = re.compile(r"(?:[xy]_(?:gray\d+(?:_inverse)?|phase[\d.]+_step\d+)|white|black)$")
-MEMORY = 200_000_000
+MEMORY = 150_000_000
 """Bytes of raw images that are held at once: of larger stacks, rows are read again."""
 
 

@@ -137,10 +137,12 @@ def fine_coordinate(
 def _coordinate(
     reading: StripeReading, place: NDArray[np.float32] | np.float32, plan: StackPlan, axis: Axis
 ) -> NDArray[np.float32]:
-    width = np.float32(plan.stripe) * (
-        1 << np.where(reading.known, reading.left_out, 0).astype(np.int32)
-    )
-    q = (reading.index + place) * width - 0.5
+    left_out = np.where(reading.known, reading.left_out, np.uint8(0)).astype(np.int32)
+    # In place and in 32 bits: these arrays are as large as the image.
+    q = place + reading.index.astype(np.float32)
+    q *= np.ldexp(np.float32(plan.stripe), left_out)
+    q -= np.float32(0.5)
     # The last stripe may be cut off by the pattern's end.
-    q = np.minimum(q, plan.size[axis] - 0.5)
-    return np.where(reading.known, q, np.nan).astype(np.float32)
+    np.minimum(q, np.float32(plan.size[axis] - 0.5), out=q)
+    q[~reading.known] = np.nan
+    return q

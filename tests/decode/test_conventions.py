@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from mitsuba_endo.decode.conventions import (
     INVERSES,
     NOTHING,
+    WORDS,
     StackConvention,
     StackOrder,
     orders,
@@ -18,7 +20,7 @@ from mitsuba_endo.decode.conventions import (
 )
 from mitsuba_endo.decode.gray_code import Code
 from mitsuba_endo.decode.phase_shift import PhaseConvention
-from mitsuba_endo.decode.plan import StackPlan, possible_plans
+from mitsuba_endo.decode.plan import STEPS, STRIPES, StackPlan, possible_plans
 from mitsuba_endo.decode.stack import Stack, decode_stack
 from mitsuba_endo.decode.stack_patterns import patterns
 from mitsuba_endo.decode.stack_reading import StackReading, StackRequest, find_reading
@@ -228,6 +230,15 @@ def test_words_state_everything(kind):
             assert [one.labels(plan) for one in orders(plan, stated)] == [order.labels(plan)]
             assert stated.allows("sign", -1)
             assert stated.allows("offset", 0.25)
+
+
+def test_the_documentation_lists_every_word():
+    """Oracle: the page of the commands, with the numbers of stripes and steps looked for."""
+    page = (Path(__file__).parents[2] / "docs" / "commands.md").read_text("utf-8")
+    for word in WORDS:
+        assert f"`{word}`" in page, word
+    assert f"({', '.join(map(str, STRIPES[:-1]))} or {STRIPES[-1]} pixels are looked for)" in page
+    assert f"({min(STEPS)} to {max(STEPS)})" in page
 
 
 def test_own_convention():
