@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
+from .decode import Refine
 from .live import watching
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ def calibrate(
     seed: Seed = 0,
     resume: Resume = None,
     pattern: Pattern = None,
+    refine: Refine = True,
     live: Live = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -104,8 +106,8 @@ def calibrate(
 ) -> None:
     """Find projector pose, focal length and surface from correspondence maps.
 
-    Images of the coded grid are decoded first, as by the command decode; their maps and pictures
-    of the grids found go into the folder "decoded" of the solution.
+    Images of the coded grid are decoded and refined first, as by the command decode; their maps and
+    pictures of the grids found go into the folder "decoded" of the solution.
     """
     from ..litter import scratch_folder
 
@@ -118,7 +120,7 @@ def calibrate(
 
         prepare_folder(out, Kind.CALIBRATION, [*maps, rig, *([resume] if resume else [])])
         checkpoint = None if resume is None else load_checkpoint(resume)
-        paths = decode_images(maps, rig, pattern, aside, output)
+        paths = decode_images(maps, rig, pattern, refine, aside, output)
         decoded = aside if any(aside.iterdir()) else None
         frames, rig_record = load_input(paths, rig, share, output.print)
         options = Options(solver=solver, surface=surface, start=start, seed=seed)

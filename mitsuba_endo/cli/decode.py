@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..decode.grid.decode import DecodedGrid
     from ..decode.image_files import ImageFrame
     from ..records.rig import Rig
+    from ..refine.decoded import DecodedMap
 
 Images = Annotated[
     list[Path],
@@ -25,6 +26,12 @@ Pattern = Annotated[
 ]
 Weights = Annotated[
     Path | None, typer.Option(help="Another decoder network, as an ONNX file.", show_default=False)
+]
+Refine = Annotated[
+    bool,
+    typer.Option(
+        "--refine/--no-refine", help="Refine decoded coordinates on the image, or keep them."
+    ),
 ]
 DEFAULT = "pattern:coded"
 
@@ -42,14 +49,25 @@ class Summary:
     """Share of the pixels that have a coordinate."""
     reason: str
     """Why nothing was decoded; empty if something was."""
+    refined: float | None
+    """Share of the decoded pixels that the image confirmed; None: not tried."""
+    unrefined: str
+    """Why the decoder's map was kept as it is; empty if it was refined or that was not tried."""
 
     def line(self) -> str:
         if self.reason:
             return f"{self.name}: nothing decoded: {self.reason}."
+        refined = (
+            ""
+            if self.refined is None
+            else f" Not refined: {self.unrefined}."
+            if self.unrefined
+            else f" {100 * self.refined:.1f} % of them refined on the image."
+        )
         return (
             f"{self.name}: {self.placed} of {self.nodes} nodes identified, "
             f"{self.nodes - self.placed} rejected, {100 * self.coverage:.1f} % of the pixels "
-            "decoded."
+            f"decoded.{refined}"
         )
 
 
@@ -59,14 +77,16 @@ def decode(
     out: Out,
     pattern: Pattern = DEFAULT,
     weights: Weights = None,
+    refine: Refine = True,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
     """Decode images of the coded grid into correspondence maps, one a frame.
 
-    NAME.exr is the map, with confidence and weight beside the coordinates; NAME_graph.png shows the
-    grid found. An image without this pattern gets no map; if that is every one, the exit code is 3.
+    NAME.exr is the map, with confidence, weight and covariance beside the coordinates;
+    NAME_graph.png shows the grid found. An image without this pattern gets no map; if that is
+    every one, the exit code is 3.
     """
     with session(quiet, as_json, debug) as output:
         from ..files import atomic_folder
@@ -77,7 +97,7 @@ def decode(
         prepare_folder(out, Kind.MAPS, [*images, rig, *([weights] if weights else [])])
         record = load_rig(rig)
         with atomic_folder(out, Kind.MAPS) as folder:
-            found = decode_into(folder, images, record, pattern, weights, output)
+            found = decode_into(folder, images, record, pattern, weights, refine, output)
             refuse_nothing(found)
         decoded = [one for one in found if not one.reason]
         output.print(*(one.line() for one in found))
@@ -91,6 +111,7 @@ def decode_into(
     rig: "Rig",
     pattern: str,
     weights: Path | None,
+    refine: bool,
     output: Session,
 ) -> list[Summary]:
     """Decode images, write maps and pictures of those with a pattern, and say what was found.
@@ -103,6 +124,7 @@ def decode_into(
     from ..decode.image_files import read_frames
     from ..decode.network import load_network
     from ..decode.pattern_option import coded_grid
+    from ..refine.decoded import decoded_map
 
     grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
     network = load_network(weights)
@@ -111,14 +133,27 @@ def decode_into(
         for frame in _sized(read_frames(images), rig):
             advance(0.0, f"Decoding {frame.name}")
             result = decode_image(frame.image, network, grid)
-            placed, coverage = int(result.assignment.assigned.sum()), result.coverage
-            found.append(Summary(frame.name, result.nodes, placed, coverage, result.reason))
-            _write(folder, frame, result)
+            map_ = decoded_map(frame.image, result, grid, frame.name, refine=refine)
+            found.append(_summary(frame.name, result, map_))
+            _write(folder, frame, result, map_)
     return found
 
 
+def _summary(name: str, result: "DecodedGrid", map_: "DecodedMap") -> Summary:
+    refined, unrefined = (
+        (None, "") if map_.refined is None else (map_.refined.refined, map_.refined.reason)
+    )
+    placed, coverage = int(result.assignment.assigned.sum()), float(map_.map.valid.mean())
+    return Summary(name, result.nodes, placed, coverage, result.reason, refined, unrefined)
+
+
 def decode_images(
-    paths: list[Path], rig_file: Path, pattern: str | None, aside: Path, output: Session
+    paths: list[Path],
+    rig_file: Path,
+    pattern: str | None,
+    refine: bool,
+    aside: Path,
+    output: Session,
 ) -> list[Path]:
     """Return correspondence maps: those given, or those of the images given, written to ``aside``.
 
@@ -134,10 +169,13 @@ def decode_images(
     if not images:
         if pattern is not None:
             raise InputError("is for images, and maps are given", "--pattern", "leave it out")
+        if not refine:
+            raise InputError("is for images, and maps are given", "--no-refine", "leave it out")
         return paths
     if len(images) < len(paths):
         raise InputError("maps and images are given", str(images[0]), "give one kind")
-    found = decode_into(aside, images, load_rig(rig_file), pattern or DEFAULT, None, output)
+    rig = load_rig(rig_file)
+    found = decode_into(aside, images, rig, pattern or DEFAULT, None, refine, output)
     refuse_nothing(found)
     output.print(*(one.line() for one in found))
     return [map_path(aside, one.name) for one in found if not one.reason]
@@ -176,17 +214,18 @@ def _sized(frames: "Iterator[ImageFrame]", rig: "Rig") -> "Iterator[ImageFrame]"
         yield frame
 
 
-def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid") -> None:
+def _write(
+    folder: Path, frame: "ImageFrame", result: "DecodedGrid", map_: "DecodedMap"
+) -> None:
     from ..png import write_png
-    from ..records.correspondence import WEIGHT, save_map
+    from ..records.correspondence import write_map
     from ..show.grid_picture import grid_picture
 
     picture = grid_picture(frame.image, result)
     write_png(folder / f"{frame.name}_graph.png", picture)
     if result.reason:
         return
-    further = {"confidence": result.confidence, WEIGHT: result.weight}
-    save_map(map_path(folder, frame.name), result.q, further)
+    write_map(map_path(folder, frame.name), map_.map, {"confidence": map_.confidence})
 
 
 def _fields(one: Summary) -> dict[str, Any]:

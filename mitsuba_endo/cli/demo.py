@@ -53,7 +53,7 @@ def demo(
             _make_input(folder, seed, output)
             rig_file, decoded = folder / "input" / "rig.yaml", folder / "decoded"
             decoded.mkdir()
-            paths = decode_images([folder / "input" / IMAGE], rig_file, None, decoded, output)
+            paths = decode_images([folder / "input" / IMAGE], rig_file, None, True, decoded, output)
             maps, rig = load_input(paths, rig_file)
             solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
             # Only now, after the solve, is the truth looked at.

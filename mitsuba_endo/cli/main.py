@@ -14,6 +14,7 @@ from .doctor import doctor
 from .evaluate import evaluate
 from .export import export
 from .patterns import patterns
+from .refine import refine
 from .render import render
 from .report import report
 from .view import view
@@ -31,6 +32,7 @@ COMMANDS = (
     patterns,
     decode,
     decode_stack,
+    refine,
     calibrate,
     evaluate,
     dataset,

@@ -1,5 +1,6 @@
 """Correspondence maps: round trips and the sentences for bad files."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,15 @@ import OpenEXR
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.records.correspondence import load_map, read_exr, save_map, write_exr
+from mitsuba_endo.records.correspondence import (
+    CorrespondenceMap,
+    load_map,
+    read_exr,
+    relative_weight,
+    save_map,
+    write_exr,
+    write_map,
+)
 
 HEIGHT, WIDTH = 5, 9
 
@@ -163,3 +172,75 @@ def test_saving_where_nothing_can_be_written(tmp_path: Path, name: str):
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match="cannot be written"):
         save_map(tmp_path / "file" / name, _q())
+
+
+def _with_covariance() -> CorrespondenceMap:
+    q = _q()
+    covariance = np.full((HEIGHT, WIDTH, 3), np.nan, np.float32)
+    known = np.isfinite(q[..., 0])
+    rng = np.random.default_rng(0)
+    covariance[known] = rng.uniform([0.01, -0.005, 0.02], [0.02, 0.005, 0.03], (known.sum(), 3))
+    return CorrespondenceMap(q, "m", relative_weight(covariance), covariance, 8.5)
+
+
+@pytest.mark.parametrize("name", ["m.exr", "m.npz"])
+def test_covariances_make_a_round_trip(tmp_path: Path, name: str):
+    """Oracle: the arrays written."""
+    written = _with_covariance()
+    write_map(tmp_path / name, written, {"confidence": np.ones((HEIGHT, WIDTH), np.float32)})
+    read = load_map(tmp_path / name)
+    assert read.covariance is not None
+    assert read.weight is not None
+    np.testing.assert_array_equal(read.covariance, written.covariance)
+    np.testing.assert_array_equal(read.weight, written.weight)
+    np.testing.assert_array_equal(read.q, written.q)
+    assert read.correlation_px == 8.5
+
+
+def test_channels_of_covariances(tmp_path: Path):
+    """Oracle: the documented names, and OpenEXR's own reader."""
+    map_ = _with_covariance()
+    write_map(tmp_path / "m.exr", map_)
+    channels = read_exr(tmp_path / "m.exr")
+    assert map_.covariance is not None
+    for i, name in enumerate(("covariance.xx", "covariance.xy", "covariance.yy")):
+        np.testing.assert_array_equal(channels[name], map_.covariance[..., i])
+    with OpenEXR.File(str(tmp_path / "m.exr")) as file:
+        assert file.header()["correlation_px"] == 8.5
+
+
+@pytest.mark.parametrize("name", ["m.exr", "m.npz"])
+def test_covariances_give_weights_where_none_are_written(tmp_path: Path, name: str):
+    """Oracle: 1 / mean variance, relative to the best; NaN covariances make pixels missing."""
+    map_ = _with_covariance()
+    assert map_.covariance is not None
+    map_.covariance[2, 2] = np.nan
+    write_map(tmp_path / name, replace(map_, weight=None, correlation_px=None))
+    read = load_map(tmp_path / name)
+    variance = (map_.covariance[..., 0] + map_.covariance[..., 2]) / 2
+    expected = np.nan_to_num(np.nanmin(variance) / variance)
+    assert read.weight is not None
+    np.testing.assert_allclose(read.weight, expected, rtol=1e-6)
+    assert not read.valid[2, 2]
+    assert read.correlation_px is None
+
+
+def test_bad_covariances_are_refused(tmp_path: Path):
+    """Oracle: the sentences, which name the file."""
+    map_ = _with_covariance()
+    assert map_.covariance is not None
+    wrong = map_.covariance.copy()
+    wrong[0, 0] = [0.01, 0.2, 0.01]
+    write_map(tmp_path / "a.npz", replace(map_, covariance=wrong, weight=None))
+    with pytest.raises(InputError, match=r"a\.npz: holds a covariance that is not positive"):
+        load_map(tmp_path / "a.npz")
+    write_map(tmp_path / "b.npz", replace(map_, covariance=wrong[..., :2], weight=None))
+    with pytest.raises(InputError, match=r"b\.npz: covariance has shape"):
+        load_map(tmp_path / "b.npz")
+    write_map(tmp_path / "c.exr", replace(map_, correlation_px=-1.0))
+    with pytest.raises(InputError, match=r"c\.exr: correlation_px is -1"):
+        load_map(tmp_path / "c.exr")
+    channels = {"projector.x": _q()[..., 0], "projector.y": _q()[..., 1]}
+    write_exr(tmp_path / "d.exr", channels | {"covariance.xx": _q()[..., 0]})
+    with pytest.raises(InputError, match=r"d\.exr: channel covariance\.xy is missing"):
+        load_map(tmp_path / "d.exr")

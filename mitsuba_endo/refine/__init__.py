@@ -1,0 +1,1 @@
+"""Refinement of decoded coordinates on the image itself."""

@@ -1,0 +1,121 @@
+"""The projected pattern as an image that can be blurred, differentiated and looked up."""
+
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..decode.grid_pattern import CodedGrid
+from ..decode.image_files import full_scale, read_image
+from ..decode.normalise import one_channel
+from ..errors import InputError
+from .cells import Image
+
+TEXELS = 4
+"""Texels per pattern pixel of a pattern given by a formula: linear interpolation of its thinnest
+lines is then right to 1 %."""
+LEVEL = 0.1
+"""Blurs are rounded to multiples of that, pattern pixels, because making one takes as long as using
+it."""
+KEPT = 6
+"""Blurred patterns kept."""
+
+
+class PatternImage:
+    """Brightness of a pattern, and its derivatives, at any blur."""
+
+    def __init__(self, texture: Image, width: int, height: int) -> None:
+        """Keep the pattern.
+
+        Args:
+            texture: (h, w) linear brightness over the whole pattern, at least a texel per pixel.
+            width: of the pattern, pattern pixels.
+            height: of the pattern.
+        """
+        self.texture = np.ascontiguousarray(texture, np.float32)
+        self.width, self.height = width, height
+        self._scale = np.array([texture.shape[1] / width, texture.shape[0] / height], np.float32)
+        self._blurred = lru_cache(KEPT)(self._make)
+
+    @classmethod
+    def of_grid(cls, grid: CodedGrid) -> "PatternImage":
+        """Return the coded grid's pattern."""
+        size = grid.width * TEXELS, grid.height * TEXELS
+        return cls(grid.texture(*size), grid.width, grid.height)
+
+    def look_up(self, q: Image, blur: float) -> tuple[Image, Image, Image]:
+        """Return brightness and its derivatives along x and y, (H, W) each.
+
+        Args:
+            q: (H, W, 2) pattern pixels, finite; beyond the pattern its border goes on.
+            blur: standard deviation of the blur, pattern pixels.
+        """
+        found = cv2.split(self._at(q, self._blurred(_level(blur))[0]))
+        value, x, y = (np.asarray(plane, np.float32) for plane in found)
+        return value, x, y
+
+    def brightness(self, q: Image, blur: float) -> Image:
+        """Return brightness (H, W); arguments as for :meth:`look_up`."""
+        return self._at(q, self._blurred(_level(blur))[1])
+
+    def laplacian(self, q: Image, blur: float) -> Image:
+        """Return the Laplacian (H, W); arguments as for :meth:`look_up`."""
+        return self._at(q, self._blurred(_level(blur))[2])
+
+    def _at(self, q: Image, texture: Image) -> Image:
+        at = (q + np.float32(0.5)) * self._scale - np.float32(0.5)
+        border = cv2.BORDER_REPLICATE
+        return np.asarray(cv2.remap(texture, at.astype(np.float32), None, cv2.INTER_LINEAR,  # pyright: ignore[reportCallIssue, reportArgumentType]
+                                    borderMode=border))  # fmt: skip
+
+    def _make(self, level: int) -> tuple[Image, Image, Image]:
+        sigma = level * LEVEL * self._scale
+        border = cv2.BORDER_REPLICATE
+        value = self.texture
+        if level:
+            value = cv2.GaussianBlur(value, (0, 0), float(sigma[0]), sigmaY=float(sigma[1]),
+                                     borderType=border)  # fmt: skip
+        y, x = np.gradient(np.asarray(value))
+        x, y = x * self._scale[0], y * self._scale[1]
+        laplacian = (
+            np.gradient(x, axis=1) * self._scale[0] + np.gradient(y, axis=0) * self._scale[1]
+        )
+        three = np.ascontiguousarray(np.stack([value, x, y], -1), np.float32)
+        return three, np.ascontiguousarray(value, np.float32), laplacian.astype(np.float32)
+
+
+def _level(blur: float) -> int:
+    return round(blur / LEVEL)
+
+
+@lru_cache(4)
+def grid_image(grid: CodedGrid) -> PatternImage:
+    """Return a coded grid's pattern, made once."""
+    return PatternImage.of_grid(grid)
+
+
+def load_pattern(path: Path, width: int, height: int, gamma: float = 1.0) -> PatternImage:
+    """Read a pattern that is known as an image, one pixel of the image a pattern pixel.
+
+    Args:
+        path: of the image.
+        width: the projector's, pattern pixels.
+        height: the projector's.
+        gamma: the image holds brightness^(1 / gamma).
+
+    Raises:
+        InputError: no image, of another size, or without any structure.
+    """
+    raw = read_image(path)
+    gray: NDArray[np.float32] = one_channel((raw / full_scale(raw)).astype(np.float32))
+    if gray.shape != (height, width):
+        raise InputError(
+            f"is {gray.shape[1]} x {gray.shape[0]} pixels and the rig's projector.width x "
+            f"projector.height {width} x {height}",
+            str(path), "give the pattern as it is projected",
+        )  # fmt: skip
+    if gray.max() == gray.min():
+        raise InputError("is one even colour", str(path), "give the pattern that is projected")
+    return PatternImage(np.clip(gray, 0, 1) ** np.float32(gamma), width, height)
