@@ -16,6 +16,7 @@ from benchmarks import (
     emitter_cost,
     first_order,
     full_resolution,
+    image,
     joint,
     pages,
     placement,
@@ -52,6 +53,7 @@ BENCHMARKS = {
         capture,
         decoder,
         decoder_end_to_end,
+        image,
         stacks,
     )
 }

@@ -28,7 +28,7 @@ class Links:
         return self.right.shape[0], self.down.shape[1]
 
     @cached_property
-    def beside_folds(self) -> NDArray[np.bool_]:
+    def lone(self) -> NDArray[np.bool_]:
         """(h, w) cells that lack one of their eight neighbours, those at the border included."""
         lone = np.zeros(self.shape, np.uint8)
         lone[:, :-1] |= ~self.right
@@ -38,6 +38,13 @@ class Links:
         lone[[0, -1]] = 1
         lone[:, [0, -1]] = 1
         return np.asarray(cv2.dilate(lone, np.ones((3, 3), np.uint8)) > 0)
+
+    @cached_property
+    def beside_folds(self) -> "list[Near]":
+        """How each pixel of a lone cell is interpolated, by its place in the cell."""
+        rows, columns = np.nonzero(self.lone)
+        offsets = range(-(SIDE // 2), SIDE // 2 + 1)
+        return [_near(self, rows, columns, dx, dy) for dy in offsets for dx in offsets]
 
     def open_to(self, rows: NDArray, columns: NDArray, x: int, y: int) -> NDArray[np.float32]:
         """Return 1 where cells are linked to their neighbour (x, y), along one axis, else 0."""
@@ -49,6 +56,41 @@ class Links:
         first = np.clip(first, 0, link.shape[1 if x else 0] - 1)
         found = link[rows, first] if x else link[first, columns]
         return (found & inside).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Interpolation of N pixels, one in each of N cells, between four cells."""
+
+    rows: NDArray[np.intp]
+    """(N,) of the pixels."""
+    columns: NDArray[np.intp]
+    cells: NDArray[np.intp]
+    """(N, 4) a pixel's own cell and its neighbours, in the flattened image of cells."""
+    weights: NDArray[np.float32]
+    """(N, 4) of sum 1, zero for cells that are not linked to the pixel's own."""
+    away: NDArray[np.float32]
+    """(4, 2) the pixel's distance from the cells' middles, pixels."""
+
+
+def _near(links: Links, rows: NDArray, columns: NDArray, dx: int, dy: int) -> Near:
+    """Return the interpolation of the pixels ``dx``, ``dy`` from the middles of cells (N,)."""
+    h, w = links.shape
+    tx, ty = abs(dx) / SIDE, abs(dy) / SIDE
+    sx, sy = int(np.sign(dx)), int(np.sign(dy))
+    across, down = links.open_to(rows, columns, sx, 0), links.open_to(rows, columns, 0, sy)
+    corner = across * links.open_to(rows, np.clip(columns + sx, 0, w - 1), 0, sy)
+    shares = [np.full(len(rows), (1 - tx) * (1 - ty), np.float32), tx * (1 - ty) * across,
+              (1 - tx) * ty * down, tx * ty * corner]  # fmt: skip
+    steps = np.array([(0, 0), (sx, 0), (0, sy), (sx, sy)])
+    weights = np.stack(shares, -1)
+    cells = (np.clip(rows[:, None] + steps[:, 1], 0, h - 1) * w
+             + np.clip(columns[:, None] + steps[:, 0], 0, w - 1))  # fmt: skip
+    return Near(
+        rows * SIDE + SIDE // 2 + dy, columns * SIDE + SIDE // 2 + dx, cells,
+        (weights / weights.sum(-1, keepdims=True)).astype(np.float32),
+        (np.array([dx, dy]) - SIDE * steps).astype(np.float32),
+    )  # fmt: skip
 
 
 def padded(image: NDArray, value: float = 0.0) -> NDArray:
@@ -88,42 +130,11 @@ def blend(value: Image, links: Links, slope: Image | None = None) -> Image:
     h, w, channels = value.shape
     value = np.ascontiguousarray(value, np.float32)
     plain = cv2.resize(value, (w * SIDE, h * SIDE), interpolation=cv2.INTER_LINEAR)
-    out = np.asarray(plain, np.float32).reshape(h, SIDE, w, SIDE, channels)
-    rows, columns = np.nonzero(links.beside_folds)
-    if len(rows):
-        for i in range(SIDE):
-            for j in range(SIDE):
-                dy, dx = i - SIDE // 2, j - SIDE // 2
-                out[rows, i, columns, j] = _at_offset(value, links, slope, (rows, columns), dx, dy)
-    return out.reshape(h * SIDE, w * SIDE, channels)
-
-
-def _at_offset(
-    value: Image,
-    links: Links,
-    slope: Image | None,
-    cells: tuple[NDArray, NDArray],
-    dx: int,
-    dy: int,
-) -> Image:
-    """Return the interpolated values (N, K) at one pixel of some cells, given by rows, columns."""
-    rows, columns = cells
-    tx, ty = abs(dx) / SIDE, abs(dy) / SIDE
-    sx, sy = int(np.sign(dx)), int(np.sign(dy))
-    open_x = links.open_to(rows, columns, sx, 0)
-    open_y = links.open_to(rows, columns, 0, sy)
-    corner = open_x * links.open_to(rows, np.clip(columns + sx, 0, value.shape[1] - 1), 0, sy)
-    total = np.zeros((len(rows), value.shape[2]), np.float32)
-    weights = np.zeros(len(rows), np.float32)
-    for x, y, weight in ((0, 0, (1 - tx) * (1 - ty) * np.ones_like(weights)),
-                         (sx, 0, tx * (1 - ty) * open_x), (0, sy, (1 - tx) * ty * open_y),
-                         (sx, sy, tx * ty * corner)):  # fmt: skip
-        if not weight.any():
-            continue
-        at = (np.clip(rows + y, 0, value.shape[0] - 1), np.clip(columns + x, 0, value.shape[1] - 1))
-        there = value[at]
+    out = np.asarray(plain, np.float32).reshape(h * SIDE, w * SIDE, channels)
+    for near in links.beside_folds:
+        found = value.reshape(-1, channels)[near.cells]
         if slope is not None:
-            there = there + slope[at] @ np.array([dx - SIDE * x, dy - SIDE * y], np.float32)
-        total += weight[:, None] * there
-        weights += weight
-    return total / weights[:, None]
+            rise = np.einsum("nfkd,fd->nfk", slope.reshape(-1, channels, 2)[near.cells], near.away)
+            found = found + rise
+        out[near.rows, near.columns] = np.einsum("nf,nfk->nk", near.weights, found)
+    return out

@@ -1,11 +1,11 @@
 """The iterations: look the pattern up, compare it with the image, move, until steps are small."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Image, Links, blend
+from .cells import SIDE, Image, Links, blend
 from .options import RefineOptions
 from .pattern_image import PatternImage
 from .regression import Fit, Ridges, normal_equations, solve
@@ -13,10 +13,10 @@ from .smoother import Smoother
 from .view import View
 from .windows import Windows
 
-DARK = 1.5
+DARK = 0.7
 """Light, in medians of the image, up to which errors are alike; above, they grow with it: noise of
 the sensor there, speckle here."""
-ROBUST = 2.0
+ROBUST = 4.0
 """Scales of the residual at which a pixel counts half (Cauchy): glints of wet tissue."""
 FIRST_SCALE = 0.1
 """Relative residual assumed before any is known."""
@@ -33,12 +33,14 @@ LONGEST = 2.0
 """Longest step of one iteration, pattern pixels."""
 ENOUGH = 0.01
 """Root mean square step, pattern pixels, at which they end: a tenth of the errors left."""
-CORE = 0.6
+CORE = 0.8
 """Blur of the pattern looked up over the one that fits best. Light scattered in tissue has wide,
 uneven tails that would pull on a pattern as wide; the narrower one looks at the core of lines."""
 BLURS = (0.3, 3.0)
 """Between them the blur lies, pattern pixels."""
 FIRST_BLUR = 0.6
+FITTED = 2
+"""Iterations after which the blur is fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,8 @@ class Refined:
     """Robust standard deviation of the relative residual."""
     blur: float
     """Of the pattern, pattern pixels."""
-    iterations: int
+    weight: Image
+    """(H, W) of the pixels in the last regression."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,39 +96,43 @@ def iterate(
         options: how many iterations, and the blur if it is given.
         blur: to begin with; None: the usual one.
     """
-    base = moved = np.zeros((*frame.windows.shape, 2), np.float32)
-    scale, predicted, found = FIRST_SCALE, frame.view.light, None
+    moved = np.zeros((*frame.windows.shape, 2), np.float32)
+    base = moved
     blur = options.blur or blur or FIRST_BLUR
+    found = None
     for k in range(max(1, options.iterations)):
-        q = start + blend(moved, frame.links)
-        value, along_x, along_y = frame.pattern.look_up(q, blur)
-        away = blend(moved - base, frame.links)
-        value_at_base = value - along_x * away[..., 0] - along_y * away[..., 1]
-        weight = frame.usable / (DARK + np.maximum(predicted, 0)) ** 2
-        if k:
-            weight *= robust_weight(frame, predicted, scale)
-        fields = [value_at_base, along_x, along_y, frame.view.light]
-        fit = solve(normal_equations(frame.windows, weight, fields), _ridges(scale), FAINT)
-        before, moved = moved, base + _grid(frame, np.clip(fit.shift, -LONGEST, LONGEST))
-        brightness = blend(_grid(frame, np.stack([fit.gain, fit.offset], -1)), frame.links)
-        predicted = brightness[..., 0] * value + brightness[..., 1]
-        scale = residual_scale(frame, predicted)
-        step = moved - before
-        found = Refined(q, moved, step, fit, predicted, (along_x, along_y), scale, blur, k + 1)
-        if options.blur is None and k < 2:
-            broadening = brightness[..., 0] * frame.pattern.laplacian(q, blur)
-            blur = _fitted_blur(frame, weight, predicted, broadening, blur)
-        if float(np.sqrt(np.mean(step**2))) < ENOUGH:
+        found = _linearise(frame, start, base, moved, blur, found)
+        moved = found.moved
+        if options.blur is None and k < FITTED:
+            blur = _fitted_blur(frame, found)
+        if float(np.sqrt(np.mean(found.step**2))) < ENOUGH:
             break
         base = frame.smoother.of_cells(moved)
     assert found is not None
-    return _at_the_end(frame, start, found)
+    return replace(found, q=start + blend(moved, frame.links))
 
 
-def _at_the_end(frame: Frame, start: Image, found: Refined) -> Refined:
-    from dataclasses import replace
-
-    return replace(found, q=start + blend(found.moved, frame.links))
+def _linearise(
+    frame: Frame, start: Image, base: Image, moved: Image, blur: float, before: Refined | None
+) -> Refined:
+    """Compare image and pattern once, at ``start`` + ``moved``, and correct from ``base`` on."""
+    q = start + blend(moved, frame.links)
+    value, along_x, along_y = frame.pattern.look_up(q, blur)
+    away = blend(moved - base, frame.links)
+    value_at_base = value - along_x * away[..., 0] - along_y * away[..., 1]
+    weight = frame.usable / (DARK + np.maximum(frame.view.light, 0)) ** 2
+    scale = FIRST_SCALE
+    if before is not None:
+        scale = before.scale
+        weight = frame.usable / (DARK + np.maximum(before.predicted, 0)) ** 2
+        weight *= robust_weight(frame, before.predicted, scale)
+    fields = [value_at_base, along_x, along_y, frame.view.light]
+    fit = solve(normal_equations(frame.windows, weight, fields), _ridges(scale), FAINT)
+    after = base + _grid(frame, np.clip(fit.shift, -LONGEST, LONGEST))
+    brightness = blend(_grid(frame, np.stack([fit.gain, fit.offset], -1)), frame.links)
+    predicted = brightness[..., 0] * value + brightness[..., 1]
+    scale = residual_scale(frame, predicted)
+    return Refined(q, after, after - moved, fit, predicted, (along_x, along_y), scale, blur, weight)
 
 
 def relative_residual(frame: Frame, predicted: Image) -> Image:
@@ -147,21 +154,19 @@ def robust_weight(frame: Frame, predicted: Image, scale: float) -> Image:
 
 def _ridges(scale: float) -> Ridges:
     # Normal matrices are sums over cells of means over pixels, and alike pixels count as one.
-    from .cells import SIDE
-
     variance = ALIKE * scale**2 / SIDE**2
     return Ridges(slope=variance / GAIN_SLOPE**2, shift=variance / SHIFT**2)
 
 
-def _fitted_blur(
-    frame: Frame, weight: Image, predicted: Image, broadening: Image, blur: float
-) -> float:
-    """Return the blur to go on with: of the pattern's variance, one linear step (dT/ds = T''/2)."""
-    power = float((weight * broadening**2).sum())
+def _fitted_blur(frame: Frame, found: Refined) -> float:
+    """Return the blur to go on with: one linear step of its variance s, for dT/ds = T''/2."""
+    gain = blend(_grid(frame, found.fit.gain[:, None]), frame.links)[..., 0]
+    broadening = gain * frame.pattern.laplacian(found.q, found.blur)
+    power = float((found.weight * broadening**2).sum())
     if power == 0:
-        return blur
-    more = 2 * float((weight * broadening * (frame.view.light - predicted)).sum()) / power
-    best = float(np.sqrt(max(blur**2 + more, 0)))
+        return found.blur
+    more = float((found.weight * broadening * (frame.view.light - found.predicted)).sum()) / power
+    best = float(np.sqrt(max(found.blur**2 + 2 * more, 0)))
     return float(np.clip(CORE * best, *BLURS))
 
 

@@ -13,13 +13,13 @@ LARGEST = 1e4
 REFERENCE = 0.1**2
 """Variance, pattern pixels squared, at which a coordinate's variance is GROWTH times the linear
 one."""
-GROWTH = 5.5
+GROWTH = 5.0
 """Beside noise in one window: noise that smoothing brings from others, and errors of the start that
 are finer than a window."""
-POWER = 0.68
+POWER = 0.33
 """By which that grows with the variance: noise that moves coordinates by a part of a line's width
 does so more than linearly. Measured, with GROWTH, on 30 photographs of five kinds of scenes with
-speckle of contrast 0 to 0.8, for which the linear variance is too small by 1.7 to 6."""
+speckle of contrast 0 to 0.8."""
 LEFT = 0.1
 """Share of a correction that is left to do: a start's errors narrower than two windows."""
 FLOOR = 0.02

@@ -28,12 +28,11 @@ def cached_shot(kind: Kind, seed: int, *, spp: int, size: tuple[int, int]) -> Sh
 
 def _save(path: Path, shot: Shot) -> None:
     lens = shot.camera
-    poses = {"world": shot.world_from_camera, "projector": shot.projector_from_camera}
     with atomic_path(path) as aside, aside.open("wb") as file:
         np.savez_compressed(
             file, laser=shot.laser, glints=shot.glints, q=shot.q, K=lens.K,
-            size=[lens.width, lens.height], distortion=np.array(lens.distortion),
-            **{name: pose.matrix() for name, pose in poses.items()},
+            size=np.array([lens.width, lens.height]), distortion=np.array(lens.distortion),
+            world=shot.world_from_camera.matrix(), projector=shot.projector_from_camera.matrix(),
         )  # fmt: skip
 
 
