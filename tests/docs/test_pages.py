@@ -57,7 +57,14 @@ def _execute(program: str, folder: Path) -> str:
 
 @pytest.mark.usefixtures("llvm")
 @pytest.mark.parametrize(
-    "page", ["start.md", "tutorials/scene.md", "tutorials/projector_law.md", "tutorials/dataset.md"]
+    "page",
+    [
+        "start.md",
+        "refinement.md",
+        "tutorials/scene.md",
+        "tutorials/projector_law.md",
+        "tutorials/dataset.md",
+    ],
 )
 def test_page_does_what_it_says(page: str, tmp_path: Path) -> None:
     """Oracle: every command ends with exit code 0, every assertion of the page holds."""
