@@ -15,7 +15,7 @@ REACH = 2.5
 
 
 class Windows:
-    """One window around every cell: along its row and from there along columns, up to a fold.
+    """One window around every cell: along its column and from there along rows, up to a fold.
 
     A window's weight is exp(-r^2 / (2 sigma^2)), 1 in the middle, and zero for cells that such a
     way cannot reach without crossing a fold.

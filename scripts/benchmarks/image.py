@@ -120,8 +120,7 @@ def normalised(case: Case) -> NDArray[np.float64]:
 def _map_figures(condition: str, cases: Sequence[Case]) -> Iterator[Figure]:
     """Yield the figures that need no calibration."""
     name = f"{condition}, {len(cases)} photographs"
-    ratios = np.array([smooth_error(c.refined.map.q, c.shot) / smooth_error(c.decoded.q, c.shot)
-                       for c in cases])  # fmt: skip
+    ratios = np.array([_smooth_ratio(c) for c in cases])
     yield _figure(f"{name}: smooth error", _mean(ratios), "of the decoder's", "lower",
                   SMOOTH_TARGETS[condition])  # fmt: skip
     yield _figure(f"{name}: smooth error, worst", float(ratios.max()), "of the decoder's", "lower",
@@ -135,7 +134,16 @@ def _map_figures(condition: str, cases: Sequence[Case]) -> Iterator[Figure]:
         z = np.concatenate([normalised(c) for c in of_kind if not c.refined.reason])
         yield _figure(f"{name}: normalised errors of a {kind}", float(np.sqrt(np.mean(z**2))),
                       "RMS, 0.8 to 1.3", "")  # fmt: skip
-        yield from _coverage(f"{condition} {kind}", of_kind)
+        if kind == "colon":
+            yield from _coverage(f"{condition} {kind}", of_kind)
+
+
+def _smooth_ratio(case: Case) -> float:
+    """Return the smooth error after over that before, over pixels that both maps have."""
+    before, after = case.decoded, case.refined.map
+    both = (before.valid & after.valid)[..., None]
+    q = (np.where(both, map_.q, np.nan) for map_ in (after, before))
+    return smooth_error(next(q), case.shot) / smooth_error(next(q), case.shot)
 
 
 def _coverage(name: str, cases: Sequence[Case]) -> Iterator[Figure]:
