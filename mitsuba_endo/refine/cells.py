@@ -48,12 +48,13 @@ class Links:
 
     def open_to(self, rows: NDArray, columns: NDArray, x: int, y: int) -> NDArray[np.float32]:
         """Return 1 where cells are linked to their neighbour (x, y), along one axis, else 0."""
-        if x == 0 and y == 0:
-            return np.zeros(len(rows), np.float32)
         link, at = (self.right, columns) if x else (self.down, rows)
+        count = link.shape[1 if x else 0]
+        if (x == 0 and y == 0) or count == 0:
+            return np.zeros(len(rows), np.float32)
         first = at + min(x + y, 0)
-        inside = (first >= 0) & (first < link.shape[1 if x else 0])
-        first = np.clip(first, 0, link.shape[1 if x else 0] - 1)
+        inside = (first >= 0) & (first < count)
+        first = np.clip(first, 0, count - 1)
         found = link[rows, first] if x else link[first, columns]
         return (found & inside).astype(np.float32)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .acceptance import judge
-from .cells import Image, repeated
+from .cells import SIDE, Image, repeated
 from .iterate import Frame, iterate
 from .options import RefineOptions
 from .smoother import Smoother
@@ -78,6 +78,7 @@ def grow(
     for value, share in ((verdict.correlation, CLEAR), (verdict.margin, SURE)):
         added &= value > share * float(np.median(value[grown.good]))
     added &= np.maximum(covariance[..., 0], covariance[..., 2]) < KNOWN**2
+    added &= frame.pattern.holds(found.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE])
     q = np.where(repeated(added)[..., None], found.q, grown.q)
     kept = np.where(added[..., None], covariance, grown.covariance)
     return Grown(q, kept, grown.good | added, grown.added | added)

@@ -45,6 +45,11 @@ class PatternImage:
         size = grid.width * TEXELS, grid.height * TEXELS
         return cls(grid.texture(*size), grid.width, grid.height)
 
+    def holds(self, q: Image) -> NDArray[np.bool_]:
+        """Tell which coordinates (..., 2) lie on the pattern."""
+        size = np.array([self.width, self.height])
+        return np.asarray(((q >= -0.5) & (q <= size - 0.5)).all(-1))
+
     def look_up(self, q: Image, blur: float) -> tuple[Image, Image, Image]:
         """Return brightness and its derivatives along x and y, (H, W) each.
 

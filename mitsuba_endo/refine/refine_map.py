@@ -26,6 +26,8 @@ CORRELATION = 1.2
 photographs: 0.68 at one window's standard deviation, 0.3 at two."""
 LEAST = 0.02
 """Share of the map's pixels that the image must confirm; with less, it is not the map's image."""
+STRAY = 0.05
+"""Share of the map's coordinates that may lie beyond the pattern: a decoder's outliers."""
 FLOOR = 1e-3
 """Least variance of a start's coordinate, pattern pixels squared."""
 
@@ -96,7 +98,7 @@ def _check(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> N
         raise InputError("the map has no finite value", start.name, "check how it was decoded")
     low, high = known.min(0), known.max(0)
     size = np.array([pattern.width, pattern.height])
-    if (low < -0.5).any() or (high > size - 0.5).any():
+    if float(np.mean(~pattern.holds(known))) > STRAY:
         raise InputError(
             f"its coordinates reach from ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, "
             f"{high[1]:.1f}) and the pattern has {size[0]} x {size[1]} pixels",

@@ -100,3 +100,13 @@ def test_a_map_of_a_larger_pattern_is_refused(inputs: Path):
     result = _refine(inputs)
     assert result.exit_code == 2
     assert "map.npz: its coordinates reach from" in result.stderr
+
+
+def test_maps_have_no_image_to_be_refined_on(inputs: Path):
+    """Oracle: the sentence; ``calibrate`` refines photographs, not maps."""
+    result = run(
+        "calibrate", inputs / "map.npz", "--rig", inputs / "rig.yaml", "--out", inputs / "result",
+        "--no-refine",
+    )  # fmt: skip
+    assert result.exit_code == 2
+    assert "--no-refine: is for images, and maps are given" in result.stderr

@@ -213,3 +213,23 @@ def test_bad_input_is_refused_by_name():
         refine_map(start, photo(truth), small)
     with pytest.raises(InputError, match="no finite value"):
         refine_map(replace(start, q=np.full_like(start.q, np.nan)), photo(truth), PATTERN)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (2, 7), (9, 40), (31, 3)])
+def test_images_of_any_size(shape: tuple[int, int]):
+    """Oracle: the map's shape; an image smaller than a window moves nothing far."""
+    truth = coordinates()[: shape[0], : shape[1]]
+    image = photo(coordinates())[: shape[0], : shape[1]]
+    start = CorrespondenceMap(truth.astype(np.float32), "frame")
+    found = refine_map(start, image, PATTERN)
+    assert found.map.q.shape == (*shape, 2)
+    assert np.nanmax(np.abs(found.map.q - truth)) < 1
+
+
+def test_a_stray_coordinate_is_no_reason_to_refuse():
+    """Oracle: one pixel of a thousand beyond the pattern; the rest is refined."""
+    truth = coordinates()
+    start = wrong_by(truth, 0.2)
+    start.q[75, 100] = [-40, 900]
+    found = refine_map(start, photo(truth), PATTERN)
+    assert found.refined > 0.9
