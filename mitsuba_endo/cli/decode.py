@@ -214,9 +214,7 @@ def _sized(frames: "Iterator[ImageFrame]", rig: "Rig") -> "Iterator[ImageFrame]"
         yield frame
 
 
-def _write(
-    folder: Path, frame: "ImageFrame", result: "DecodedGrid", map_: "DecodedMap"
-) -> None:
+def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid", map_: "DecodedMap") -> None:
     from ..png import write_png
     from ..records.correspondence import write_map
     from ..show.grid_picture import grid_picture

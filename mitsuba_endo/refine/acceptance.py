@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import Image, mean
-from .iterate import FAINT, Frame, Refined
+from .iterate import FAINT, Comparison, Refined
 from .rivals import contest
 
 LEAST = 0.3
@@ -42,7 +42,7 @@ class Verdict:
     """Of the image with the model, offset and its slope taken away; 0 to 1."""
 
 
-def judge(frame: Frame, refined: Refined, covariance: Image) -> Verdict:
+def judge(frame: Comparison, refined: Refined, covariance: Image) -> Verdict:
     """Judge every cell of a refinement.
 
     Args:
@@ -67,7 +67,7 @@ def judge(frame: Frame, refined: Refined, covariance: Image) -> Verdict:
     return Verdict(good, beaten, own - rival, correlation)
 
 
-def _covered(frame: Frame) -> NDArray[np.bool_]:
+def _covered(frame: Comparison) -> NDArray[np.bool_]:
     """Return the cells whose windows hold enough usable pixels."""
     held = frame.windows.moments([mean(frame.usable)]).of(0, 0).reshape(frame.windows.shape)
     return np.asarray(held >= COVERED * held.max(initial=1e-9))

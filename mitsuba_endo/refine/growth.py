@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .acceptance import judge
 from .cells import SIDE, Image, repeated
-from .iterate import Frame, iterate
+from .iterate import Comparison, iterate
 from .options import RefineOptions
 from .smoother import Smoother
 from .uncertainty import cell_covariance
@@ -44,7 +44,7 @@ class Grown:
 
 
 def grow(
-    frame: Frame, grown: Grown, options: RefineOptions, blur: float, barred: NDArray[np.bool_]
+    frame: Comparison, grown: Grown, options: RefineOptions, blur: float, barred: NDArray[np.bool_]
 ) -> Grown:
     """Grow a map by up to :data:`STRIDE` cells all around.
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from .cells import SIDE, Image, Links, blend
 from .options import RefineOptions
 from .pattern_image import PatternImage
-from .regression import Fit, Ridges, normal_equations, solve
+from .regression import Ridges, WindowFit, normal_equations, solve
 from .smoother import Smoother
-from .view import View
+from .view import ImageView
 from .windows import Windows
 
 DARK = 0.7
@@ -53,7 +53,7 @@ class Refined:
     """(h, w, 2) by which a cell moved in all."""
     step: Image
     """(h, w, 2) by which it moved in the last iteration."""
-    fit: Fit
+    fit: WindowFit
     """The last regression."""
     predicted: Image
     """(H, W) the image as the model has it."""
@@ -68,10 +68,10 @@ class Refined:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class Comparison:
     """What stays the same over all iterations."""
 
-    view: View
+    view: ImageView
     usable: Image
     """(H, W) 1 where a pixel has a coordinate and is clear, else 0."""
     links: Links
@@ -82,7 +82,7 @@ class Frame:
 
 
 def iterate(
-    frame: Frame, start: Image, options: RefineOptions, blur: float | None = None
+    frame: Comparison, start: Image, options: RefineOptions, blur: float | None = None
 ) -> Refined:
     """Move coordinates to where image and pattern agree.
 
@@ -113,7 +113,7 @@ def iterate(
 
 
 def _linearise(
-    frame: Frame, start: Image, base: Image, moved: Image, blur: float, before: Refined | None
+    frame: Comparison, start: Image, base: Image, moved: Image, blur: float, before: Refined | None
 ) -> Refined:
     """Compare image and pattern once, at ``start`` + ``moved``, and correct from ``base`` on."""
     q = start + blend(moved, frame.links)
@@ -135,18 +135,18 @@ def _linearise(
     return Refined(q, after, after - moved, fit, predicted, (along_x, along_y), scale, blur, weight)
 
 
-def relative_residual(frame: Frame, predicted: Image) -> Image:
+def relative_residual(frame: Comparison, predicted: Image) -> Image:
     """Return the residual (H, W) over what noise grows with."""
     return (frame.view.light - predicted) / (DARK + np.maximum(predicted, 0))
 
 
-def residual_scale(frame: Frame, predicted: Image) -> float:
+def residual_scale(frame: Comparison, predicted: Image) -> float:
     """Return the robust standard deviation of the relative residual."""
     used = relative_residual(frame, predicted)[frame.usable > 0]
     return max(1.4826 * float(np.median(np.abs(used[::7]))), 1e-4) if used.size else FIRST_SCALE
 
 
-def robust_weight(frame: Frame, predicted: Image, scale: float) -> Image:
+def robust_weight(frame: Comparison, predicted: Image, scale: float) -> Image:
     """Return Cauchy weights (H, W) of the pixels."""
     z = relative_residual(frame, predicted) / np.float32(ROBUST * scale)
     return 1 / (1 + z * z)
@@ -158,7 +158,7 @@ def _ridges(scale: float) -> Ridges:
     return Ridges(slope=variance / GAIN_SLOPE**2, shift=variance / SHIFT**2)
 
 
-def _fitted_blur(frame: Frame, found: Refined) -> float:
+def _fitted_blur(frame: Comparison, found: Refined) -> float:
     """Return the blur to go on with: one linear step of its variance s, for dT/ds = T''/2."""
     gain = blend(_grid(frame, found.fit.gain[:, None]), frame.links)[..., 0]
     broadening = gain * frame.pattern.laplacian(found.q, found.blur)
@@ -170,5 +170,5 @@ def _fitted_blur(frame: Frame, found: Refined) -> float:
     return float(np.clip(CORE * best, *BLURS))
 
 
-def _grid(frame: Frame, values: NDArray) -> Image:
+def _grid(frame: Comparison, values: NDArray) -> Image:
     return values.reshape(*frame.windows.shape, -1).astype(np.float32)

@@ -11,7 +11,7 @@ from .acceptance import Verdict, judge
 from .cells import Image, Links, any_in, blend, padded, repeated
 from .folds import find_links
 from .growth import Grown, grow
-from .iterate import Frame, Refined, iterate
+from .iterate import Comparison, Refined, iterate
 from .options import RefineOptions
 from .pattern_image import PatternImage
 from .smoother import Smoother
@@ -108,7 +108,7 @@ def _check(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> N
 
 def _prepare(
     start: CorrespondenceMap, image: NDArray, pattern: PatternImage, options: RefineOptions
-) -> tuple[Frame, Image]:
+) -> tuple[Comparison, Image]:
     """Return what stays the same over all iterations, and the smoothed start (H, W, 2)."""
     view = view_of(image, start.valid, options.gamma)
     q = padded(start.q.astype(np.float32), np.nan)
@@ -119,11 +119,11 @@ def _prepare(
     smooth = Smoother(windows, links, weight).pixels(np.where(known[..., None], q, 0))
     wide = Smoother(Windows(links, WIDER * options.window), links, weight)
     usable = (known & view.clear).astype(np.float32)
-    return Frame(view, usable, links, windows, wide, pattern), smooth
+    return Comparison(view, usable, links, windows, wide, pattern), smooth
 
 
 def _grown(
-    frame: Frame, found: Refined, covariance: Image, verdict: Verdict, options: RefineOptions
+    frame: Comparison, found: Refined, covariance: Image, verdict: Verdict, options: RefineOptions
 ) -> Grown:
     none = np.zeros_like(verdict.good)
     grown = Grown(found.q, covariance, verdict.good, none)

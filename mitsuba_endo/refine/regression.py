@@ -43,7 +43,7 @@ class Ridges:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class WindowFit:
     """Solution of every cell's regression, (N,) or (N, ...)."""
 
     shift: Floats
@@ -103,7 +103,7 @@ def _product(weighted: Image, field: Image | None) -> Image:
     return weighted if field is None else weighted * field
 
 
-def solve(A: dict[tuple[int, int], Floats], ridges: Ridges, floor: float) -> Fit:
+def solve(A: dict[tuple[int, int], Floats], ridges: Ridges, floor: float) -> WindowFit:
     """Solve every cell's regression by elimination, all cells at once.
 
     Args:
@@ -130,7 +130,7 @@ def solve(A: dict[tuple[int, int], Floats], ridges: Ridges, floor: float) -> Fit
     det = np.maximum(uu * vv - uv * uv, 1e-30)
     u, v = (vv * A[6, 8] - uv * A[7, 8]) / det, (uu * A[7, 8] - uv * A[6, 8]) / det
     explained = u * A[6, 8] + v * A[7, 8]
-    return Fit(
+    return WindowFit(
         shift=np.stack([u, v], -1) / gain[:, None], gain=gain, offset=x[OFFSET],
         information=np.stack([uu, uv, vv], -1) * (gain**2)[:, None], prior=prior * gain**2,
         residual=np.maximum(A[IMAGE, IMAGE] - explained, 0), variation=variation, weight=weight,

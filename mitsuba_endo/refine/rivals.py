@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import SIDE, Image
-from .iterate import DARK, Frame, Refined, robust_weight
+from .iterate import DARK, Comparison, Refined, robust_weight
 from .pattern_image import PatternImage
 from .windows import Windows
 
@@ -50,7 +50,7 @@ def rival_shifts(pattern: PatternImage) -> NDArray[np.float32]:
     return np.stack([columns - reach, rows - reach], -1)[order].astype(np.float32)
 
 
-def contest(frame: Frame, refined: Refined) -> tuple[Image, Image]:
+def contest(frame: Comparison, refined: Refined) -> tuple[Image, Image]:
     """Return how well image and pattern correlate (h, w) here, and at each cell's best rival.
 
     The latter is -1 where there are no rivals.

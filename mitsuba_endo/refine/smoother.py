@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import SIDE, Image, Links, blend, mean
-from .windows import Moments, Windows
+from .windows import WindowMoments, Windows
 
 LEAST = 1e-3
 """Least share of its variance that a direction must keep to have a slope; below, it has none."""
@@ -71,7 +71,7 @@ class Smoother:
             out.append(self._solve(self._windows.moments([v * x, v * y], [v * one]))[0])
         return np.stack(out, -1)
 
-    def _solve(self, m: Moments) -> tuple[Image, Image]:
+    def _solve(self, m: WindowMoments) -> tuple[Image, Image]:
         s = np.maximum(self.support, 1e-9)
         total = m.of(1, 0)
         bx = m.of(1, 0, 1, 0) + m.of(0, 0) - self._sx * total / s

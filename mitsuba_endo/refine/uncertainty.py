@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from .cells import SIDE, Image, mean
-from .iterate import DARK, ROBUST, Frame, Refined, relative_residual
+from .iterate import DARK, ROBUST, Comparison, Refined, relative_residual
 
 LAG = 2
 """Camera pixels up to which residuals go together: grains of speckle, the lens's blur."""
@@ -26,7 +26,7 @@ FLOOR = 0.02
 """Standard deviation of what is finer than any window, pattern pixels."""
 
 
-def cell_covariance(frame: Frame, refined: Refined) -> Image:
+def cell_covariance(frame: Comparison, refined: Refined) -> Image:
     """Return the covariance (h, w, 3) of u and v, xx, xy, yy, in pattern pixels squared.
 
     A sandwich: under each window the inverse of the normal matrix times its mean squared residual,
@@ -49,7 +49,7 @@ def cell_covariance(frame: Frame, refined: Refined) -> Image:
     return np.clip(covariance, -LARGEST, LARGEST).reshape(*shape, 3).astype(np.float32)
 
 
-def _excess(frame: Frame, refined: Refined, derivative: Image) -> float:
+def _excess(frame: Comparison, refined: Refined, derivative: Image) -> float:
     """Return the variance of displacements along one axis over that of independent residuals."""
     base = frame.usable / (DARK + np.maximum(refined.predicted, 0)) ** 2
     z = relative_residual(frame, refined.predicted) / np.float32(ROBUST * refined.scale)

@@ -16,7 +16,7 @@ HALO = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class ImageView:
     """One image; all arrays are filled up to whole cells."""
 
     light: Image
@@ -29,7 +29,7 @@ class View:
 
 def view_of(
     image: NDArray[np.integer] | NDArray[np.floating], known: NDArray[np.bool_], gamma: float
-) -> View:
+) -> ImageView:
     """Return what is to be looked at of an image.
 
     Args:
@@ -46,7 +46,7 @@ def view_of(
     light = light / max(middle, 1e-6)
     bright = (_largest(image) >= SATURATED).astype(np.uint8)
     clear = cv2.dilate(bright, HALO) == 0
-    return View(padded(light.astype(np.float32)), padded(np.asarray(clear), False), gray.shape)
+    return ImageView(padded(light.astype(np.float32)), padded(np.asarray(clear), False), gray.shape)
 
 
 def _largest(image: NDArray) -> Image:

@@ -41,7 +41,7 @@ class Windows:
     def _columns(self) -> "_Line":
         return _Line(self._links.down.T, self._taps, self.shape, along_rows=False)
 
-    def moments(self, *fields: Sequence[Image]) -> "Moments":
+    def moments(self, *fields: Sequence[Image]) -> "WindowMoments":
         """Return windowed moments of fields (h, w).
 
         Args:
@@ -61,10 +61,10 @@ class Windows:
                  (2, 0): y0[:, every + linear :], (0, 1): y1[:, :linear],
                  (1, 1): y1[:, linear:], (0, 2): y2}  # fmt: skip
         starts = (linear, two, 0)
-        return Moments(table, starts)
+        return WindowMoments(table, starts)
 
 
-class Moments:
+class WindowMoments:
     """Sums over windows of a field times powers of the distance from the middle, camera pixels."""
 
     def __init__(self, table: dict[tuple[int, int], NDArray], starts: tuple[int, int, int]) -> None:
