@@ -41,8 +41,8 @@ def main(
     hits = 0
     while hits < kills:
         process = start(killed, command.arguments)
-        # Together they leave about half of the samples to the last run.
-        time.sleep(rng.uniform(1.0, max(2.0, 1.5 * seconds / kills)))
+        # Short enough that samples are left to the last run.
+        time.sleep(rng.uniform(1.0, max(2.0, 0.9 * seconds / kills)))
         if process.poll() is None:
             hits += 1
             process.send_signal(SIGNALS[int(rng.integers(len(SIGNALS)))])

@@ -156,7 +156,9 @@ def _dataset(form: str) -> Any:
 
         (folder.parent / "config.yaml").write_text(yaml.safe_dump(_small(form)), encoding="utf-8")
         config = load_config(folder.parent / "config.yaml")
-        make_dataset(config, folder, 2, lambda job: LocalPool(job, 1))
+        progress = make_dataset(config, folder, 2, lambda job: LocalPool(job, 1))
+        if progress.done != 2:  # a program without a guard before its main part has no workers
+            raise RuntimeError("no sample was made")
         (folder.parent / "config.yaml").rename(folder / "config.yaml")
 
     return make
