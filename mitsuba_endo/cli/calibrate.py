@@ -58,6 +58,13 @@ SurfaceKind = Annotated[
         "from all, for folds and for cameras that travel.",
     ),
 ]
+CheckModel = Annotated[
+    bool,
+    typer.Option(
+        "--check-model",
+        help="Test the model against its residuals and name what is wrong (tried on few rigs).",
+    ),
+]
 Start = Annotated[
     Literal["search", "plane"],
     typer.Option(help="Search for a start, or the published plane and front-parallel projector."),
@@ -94,6 +101,7 @@ def calibrate(
     solver: Solver = "levenberg-marquardt",
     surface: SurfaceKind = "lattice",
     start: Start = "search",
+    check_model: CheckModel = False,
     share: Share = None,
     seed: Seed = 0,
     resume: Resume = None,
@@ -123,7 +131,9 @@ def calibrate(
         paths = decode_images(maps, rig, pattern, refine, aside, output)
         decoded = aside if any(aside.iterdir()) else None
         frames, rig_record = load_input(paths, rig, share, output.print)
-        options = Options(solver=solver, surface=surface, start=start, seed=seed)
+        options = Options(
+            solver=solver, surface=surface, start=start, check_model=check_model, seed=seed
+        )
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
             solution = solve_and_write(

@@ -48,7 +48,8 @@ class Estimate(Record):
 
     value: float | list[float] | None
     std: float | list[float] | None = None
-    """The larger of the formal and the block-jackknife standard deviation, same unit."""
+    """The larger of the formal one times the root of the residuals' design effect, and the
+    block-jackknife one; same unit."""
     std_formal: float | list[float] | None = None
     """From the Hessian at the solution: right if the model is."""
     std_jackknife: float | list[float] | None = None
@@ -181,6 +182,8 @@ class Solution(Record):
     """Robust estimate of the noise of one projector coordinate, pattern pixels; where maps have
     weights, of a coordinate of their mean weight."""
     law_evidence: dict[str, Any] = {}
+    model: dict[str, Any] = {}
+    """Structure of the residuals, what may cause it, and what it does to the intervals."""
     observability: dict[str, Any] = {}
     timings: dict[str, float] = {}
     versions: dict[str, str] = {}

@@ -70,6 +70,7 @@ def _article(number: int, name: str, scene: ResultScene, view: SurfaceView) -> s
     calibration, solution = scene.calibration, scene.calibration.solution
     return (
         f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
+        f"{sections.model(solution)}"
         f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
         f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(scene, view, number)}"
         f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"

@@ -36,6 +36,25 @@ def verdict(solution: Solution) -> str:
     return out + (f"<h3>Warnings</h3>{_list('notes', notes)}" if notes else "")
 
 
+def model(solution: Solution) -> str:
+    """List what may be wrong with the model, by how much of the residuals it explains."""
+    found = solution.model
+    if not found.get("suspected"):
+        return ""
+    lines = "".join(
+        f"<tr><th>{escape(c['words'])}</th><td>{c['value']:+.3g} ± {c['std']:.2g} "
+        f"{escape(c['unit'])}</td><td>{100 * c['share']:.0f} %</td>"
+        f"<td>{escape(', '.join(c['group']))}</td></tr>"
+        for c in found["candidates"]
+    )
+    return (
+        f"<h3>Model</h3><p>Structure of the residuals {found['structure']:.2f}, of noise "
+        f"{found['expected']:.2f}; intervals are {found['intervals_by']:.1f} times as wide as "
+        "noise alone would make them.</p><table><tr><th>May be wrong</th><th>By</th>"
+        f"<th>Explains</th><th>Looks like</th></tr>{lines}</table>"
+    )
+
+
 def given(solution: Solution) -> str:
     """Say which values are input, not results."""
     projector = solution.projector

@@ -25,6 +25,7 @@ from .history import History
 from .inference.covariance import uncertainty
 from .inference.fit import Fit, FrameSolution
 from .inference.frame_consistency import consistencies, worst
+from .inference.model_error.analysis import check_model
 from .inference.observability import Direction
 from .inference.predicted_observability import predicted_directions
 from .minimisers.minimise import OnIteration, Progress, minimise
@@ -276,10 +277,16 @@ def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
 def infer(job: Job, done: Optimised, say: Progress) -> Fit:
     """Smooth the surface to be reported and tell how well everything is known."""
     say(0.0, "Computing standard deviations")
+    result, model = done.result, None
+    if job.options.check_model:
+        with job.timed("model"):
+            result, model = check_model(done.result, job.rig, job.options)
     with job.timed("surface"):
-        reported = smooth_surfaces(done.result, job.options)
+        reported = smooth_surfaces(result, job.options)
     with job.timed("uncertainty"):
-        known = uncertainty(done.result, reported, job.options.jackknife)
+        known = uncertainty(result, reported, job.options.jackknife)
+    if model is not None:
+        model = replace(model, understated=max(known.sigma / result.noise.sigma, 1.0))
     given = [m.name for m in job.maps]
-    return Fit(job.law, done.maps, done.left_out, given, done.result, reported, known,
-               done.notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip
+    return Fit(job.law, done.maps, done.left_out, given, result, reported, done.result, model,
+               known, done.notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip

@@ -13,6 +13,7 @@ from ..costs.problem import Problem
 from ..minimisers.result import OptimisationResult
 from ..unknowns.state import State
 from .covariance import Uncertainty
+from .model_error.analysis import ModelCheck
 from .observability import Direction
 
 
@@ -57,6 +58,10 @@ class Fit:
     """The calibration."""
     reported: OptimisationResult
     """The same with the surface smoothed as it is reported."""
+    plain: OptimisationResult
+    """The calibration before errors of the model were carried into it; the same where none were."""
+    model: ModelCheck | None
+    """What the residuals say of the model, None where that was not asked."""
     uncertainty: Uncertainty
     notes: list[str]
     """From the initialisation: what the user should know."""

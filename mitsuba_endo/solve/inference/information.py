@@ -13,6 +13,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from ..costs.problem import evaluate
+from ..costs.term import ResidualTerm
 from ..elimination.normal import NormalEquations, Reduced, SurfaceBlock, surface_rows
 from ..minimisers.result import OptimisationResult
 from ..unknowns.state import State
@@ -88,7 +89,7 @@ def data_information(
         reduced: the same, reduced.
         variance: of one coordinate, pattern pixels squared.
     """
-    S = _information(smooth, smooth.state, normal)
+    S, known = _information(smooth, smooth.state, normal), _priors(smooth)
     scale = np.array([u.scale for u in problem_unknowns(smooth.problem, smooth.state)])
     weakest = scipy.linalg.eigvalsh(S * np.outer(scale, scale))[:1]
     if not len(S) or weakest[0] * _DOUBTFUL**2 > variance:
@@ -101,9 +102,18 @@ def data_information(
         again = at.normal_equations(smooth.noise, smooth.weights)
         noisy.append(_information(smooth, state, again))
     return Information(
-        without_false_information(S, np.mean(noisy, axis=0)),
+        without_false_information(S - known, np.mean(noisy, axis=0) - known) + known,
         _information(result, result.state, result.normal_equations()),
     )
+
+
+def _priors(result: OptimisationResult) -> NDArray[np.float64]:
+    """Return the information (G, G) of terms over the unknowns alone, which noise does not fake."""
+    normal = NormalEquations.empty(result.problem.surfaces, result.problem.layout.columns)
+    for term in result.problem.others:
+        if isinstance(term, ResidualTerm):
+            term.accumulate(normal, result.state, result.noise)
+    return normal.D
 
 
 def without_false_information(

@@ -12,6 +12,7 @@ from ...records.calibration import Calibration
 from ...records.history import scaled
 from ...records.rig import Camera, Rig
 from ...records.solution import Alternative, Estimate, Frame, ProjectorEstimate, Solution
+from ...sanity.working_distance import working_distance
 from ..frames.resume import checkpoint_of
 from ..inference.alternatives import alternative
 from ..inference.fit import Fit
@@ -22,7 +23,8 @@ from ..minimisers.result import USED_WEIGHT
 from ..options import Options
 from ..unknowns.block import BLOCKS, VectorBlock
 from .estimates import Estimates, inflation
-from .scale import resolve_unit
+from .model_section import model_section
+from .scale import Unit, resolve_unit
 from .surface_result import frame_maps, surface_estimate
 from .verdict import verdict
 from .warnings import fit_warnings
@@ -67,6 +69,7 @@ def assemble(
         surface="surface.ply",
         noise_px=fit.uncertainty.sigma,
         law_evidence=law_evidence or {},
+        model=model_section(fit),
         observability={
             "before_optimising": describe(fit.predicted),
             "free_directions": describe(estimates.directions),
@@ -75,14 +78,27 @@ def assemble(
         timings=fit.timings,
         versions=versions(),
         configuration={"options": asdict(options), "rig": rig.model_dump(mode="json")},
-        warnings=fit_warnings(estimates, refined, renderings, warnings or []),
+        warnings=[
+            *fit_warnings(estimates, refined, renderings, warnings or []),
+            *_implausible_scale(fit, unit, renderings, rig),
+        ],
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(
         solution, refined, surfaces[0], frame_maps(fit, renderings), fit.result.trace,
-        checkpoint_of(fit.result), dict(enumerate(surfaces[1:], 1)),
+        checkpoint_of(fit.plain), dict(enumerate(surfaces[1:], 1)),
         scaled(fit.history, unit.factor),
     )  # fmt: skip
+
+
+def _implausible_scale(fit: Fit, unit: Unit, renderings: list[Rendering], rig: Rig) -> list[str]:
+    """Return a warning where the scale implies a working distance that no such rig has."""
+    seen = renderings[0].range[np.isfinite(renderings[0].range)]
+    if not len(seen):
+        return []
+    baseline = unit.factor * float(np.linalg.norm(fit.state.at("projector_pose", 0).t))
+    found = working_distance(baseline, unit.factor * float(np.median(seen)), rig)
+    return [finding.warning for finding in found]
 
 
 def _alternatives(estimates: Estimates) -> list[Alternative]:

@@ -12,6 +12,7 @@ from ...records.solution import Estimate, Outcome, PoseEstimate, Status
 from ...start.rivals import Rival
 from ..inference.alternatives import AMBIGUOUS, ambiguities
 from ..inference.fit import Fit
+from ..inference.model_error.analysis import with_effect
 from ..inference.observability import (
     Direction,
     Unknown,
@@ -29,6 +30,8 @@ Floats = NDArray[np.float64]
 
 UNSETTLED = "the optimisation had not converged"
 """Why a value with a small standard deviation is weak."""
+STRUCTURED = "the residuals hold structure that the model does not explain, see Model"
+"""Why one that the relief would determine is weak."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +52,12 @@ class Estimates:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(G, G) formal one, scaled so that no variance is below the jackknife's."""
-        formal = self.fit.uncertainty.formal
+        """(G, G) formal one, times the design effect of the residuals, and scaled so that no
+        variance is below the jackknife's.
+        """
+        formal, model = self.fit.uncertainty.formal, self.fit.model
+        if model is not None:
+            formal = with_effect(self.fit.reported, formal, model.effect)
         variance = np.diag(formal)
         largest = np.max([variance, *jackknife_variances(self.fit)], axis=0)
         root = np.sqrt(largest / np.maximum(variance, 1e-300))
@@ -81,6 +88,9 @@ class Estimates:
         its way along a valley that has no end.
         """
         worst, outcome = self._worst(slot), self.fit.result.outcome
+        model = self.fit.model
+        if worst == "measured" and model is not None and model.unexplained:
+            return "weak"
         if outcome is Outcome.CONVERGED or worst == "unobservable":
             return worst
         ended = outcome in (Outcome.STALLED, Outcome.MAX_ITERATIONS)
@@ -139,6 +149,12 @@ class Estimates:
         names = self.names[slot]
         return status_of(max(float(d) / n.scale for d, n in zip(deviations, names, strict=True)))
 
+    def _noise_allows(self, slot: slice) -> bool:
+        """Tell whether a block would be measured if noise were all that the residuals hold."""
+        std = np.sqrt(np.diag(self.fit.uncertainty.formal))[slot]
+        scales = [n.scale for n in self.names[slot]]
+        return status_of(float(np.max(std / scales))) == "measured"
+
     def _ambiguous(self, frame: int) -> bool:
         """Tell whether the residuals cannot choose between this frame's pose and another."""
         return any(frame in frames and not rival.decided for frames, rival in self.rivals)
@@ -146,7 +162,10 @@ class Estimates:
     def _reason(self, name: str, frame: int, slot: slice) -> str:
         """Say why a block is not measured, and what would help."""
         if self._worst(slot) == "measured":
-            return UNSETTLED
+            settled = self.fit.result.outcome is Outcome.CONVERGED
+            return STRUCTURED if settled else UNSETTLED
+        if self.fit.model is not None and self.fit.model.wrong and self._noise_allows(slot):
+            return STRUCTURED
         (surface, *_), (values, *_) = self.fit.problem.surfaces, self.fit.state.surfaces
         flat = is_flat(surface.vertices(values))
         mine = {n.words for n in self.names[slot]}
@@ -177,10 +196,11 @@ def jackknife_variances(fit: Fit) -> list[Floats]:
 
 
 def inflation(fit: Fit) -> float:
-    """Return by how much the jackknife's standard deviations exceed the formal ones, at least 1."""
+    """Return by how much standard deviations exceed the formal ones, at least 1."""
     formal = np.diag(fit.uncertainty.formal)
     ratios = [np.median(v / formal) for v in jackknife_variances(fit) if len(v)]
-    return float(np.sqrt(max([1.0, *ratios])))
+    effect = 1.0 if fit.model is None else fit.model.effect
+    return float(np.sqrt(max([1.0, effect, *ratios])))
 
 
 def listed(items: Sequence[str]) -> str:
@@ -196,4 +216,5 @@ def _vector_block(name: str) -> VectorBlock:
 
 def _plain(block: VectorBlock, values: Floats) -> float | list[float]:
     """Return a number for blocks that are one, else a list."""
-    return float(values[0]) if block.part_names == ("",) else [float(v) for v in values]
+    single = block.part_names == ("",) and len(values) == 1
+    return float(values[0]) if single else [float(v) for v in values]

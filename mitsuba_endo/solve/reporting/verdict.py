@@ -20,6 +20,8 @@ def verdict(solution: Solution) -> list[str]:
             out += _pose(named, frame.projector_from_camera, unit)
         if frame.world_from_camera.status != "fixed":
             out += _pose(f"Camera pose{where}", frame.world_from_camera, unit)
+    if "conclusion" in solution.model:
+        out.append(f"Model: {solution.model['conclusion']}.")
     return out + [_alternative(solution, a) for a in solution.alternatives]
 
 

@@ -6,6 +6,7 @@ from ...geometry.cameras import CameraModel
 from ...records.solution import Outcome
 from ..minimisers.rendered import Rendering
 from .estimates import Estimates, listed
+from .model_section import model_warnings
 from .redundancy import FrameView, redundancy_warnings
 
 
@@ -34,6 +35,7 @@ def fit_warnings(
         *of_model,
         *([estimates.unit.warning] if estimates.unit.warning else []),
         *_convergence(estimates),
+        *model_warnings(fit),
         *(f"frame {f.name} was left out: {f.reason}" for f in fit.left_out),
         *_separate_scales(estimates),
         *redundancy_warnings(views, camera, fit.uncertainty.sigma),

@@ -8,7 +8,10 @@ import numpy as np
 from ...geometry.arrays import namespace
 from ...records.rig import Rig
 from ...rendering.coordinates import FrameModel
-from .block import Floats, LogarithmBlock, register_block
+from .block import Floats, LogarithmBlock, Value, register_block
+
+_STD = 0.001
+"""Of a careful calibration, relative."""
 
 
 @register_block
@@ -25,3 +28,6 @@ class Aspect(LogarithmBlock):
     def attach(self, model: FrameModel, value: Any) -> FrameModel:
         aspect = namespace(value[0]).exp(value[0])
         return replace(model, projector=model.projector.with_(aspect=aspect))
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        return np.eye(1) / _STD

@@ -9,7 +9,7 @@ To add an unknown, write one file in this package with a class under ``@register
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -35,6 +35,18 @@ class NaturalScales:
     """Focal length of the projector, pattern pixels."""
     camera_focal: float
     """Focal length of the camera, pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """One way in which a given value may be wrong."""
+
+    part: str
+    """Of the block, a key; empty where the block has only one."""
+    words: str
+    step: Floats
+    """(width,) step of the value that mends it by one unit."""
+    unit: str
 
 
 class Block(ABC):
@@ -98,6 +110,21 @@ class Block(ABC):
         """Return the standard deviations (width,) with which the rig knows the value, or None."""
         return None
 
+    def doubt(self, rig: Rig, value: Value) -> Floats | None:
+        """Return the square-root information (m, width) of what is given but seldom exact.
+
+        By the rig's own deviations, else by those of careful calibrations; None where a wrong
+        value is no error of a calibration but a mistake.
+        """
+        return None
+
+    def suspects(self, names: Sequence[str]) -> list["Suspect"]:
+        """Return the ways in which a value that is given may be wrong."""
+        return [
+            Suspect(part, f"{self.words} ({part})" if part else self.words, step, self.unit)
+            for part, step in zip(names, np.eye(len(names)), strict=True)
+        ]
+
     def sharing(self, rig: Rig) -> Sharing:
         """Return the mode that the rig asks for."""
         return rig.share.of(self.name) or self.default_sharing
@@ -147,6 +174,10 @@ class LogarithmBlock(VectorBlock):
 
     def reported_slope(self, value: Value) -> Floats:
         return np.exp(value)
+
+    def suspects(self, names: Sequence[str]) -> list[Suspect]:
+        found = super().suspects(names)
+        return [replace(s, step=0.01 * s.step, unit="%") for s in found]
 
 
 class PoseBlock(Block):

@@ -9,6 +9,9 @@ from ...records.rig import Rig, Sharing
 from ...rendering.coordinates import FrameModel
 from .block import Floats, NaturalScales, Value, VectorBlock, register_block
 
+_STD_PX = 1.0
+"""Of a careful calibration."""
+
 
 @register_block
 class CameraCentre(VectorBlock):
@@ -40,3 +43,7 @@ class CameraCentre(VectorBlock):
     def prior_std(self, rig: Rig, value: Value) -> Floats | None:
         std = rig.camera.K_std
         return None if std is None else np.array(std[2:], float)
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        std = self.prior_std(rig, value)
+        return np.diag(1 / (np.full(2, _STD_PX) if std is None else std))

@@ -13,6 +13,10 @@ from .block import Floats, Value, VectorBlock, register_block
 _LEAST_TERMS = 2
 """Coefficients that are unknowns where the rig names none: k1 and k2."""
 
+_STD = {"k1": 0.005, "k2": 0.01, "p1": 0.001, "p2": 0.001}
+_OTHER_STD = 0.01
+"""Of a careful calibration."""
+
 
 @register_block
 class CameraDistortion(VectorBlock):
@@ -42,3 +46,10 @@ class CameraDistortion(VectorBlock):
         if std is None:
             return None
         return np.full(len(value), std) if isinstance(std, float) else np.array(std, float)
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        std = self.prior_std(rig, value)
+        if std is None:
+            names = self.names(rig)
+            std = np.array([_STD.get(name, _OTHER_STD) for name in names])
+        return np.diag(1 / std)

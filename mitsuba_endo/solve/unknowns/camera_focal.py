@@ -1,5 +1,6 @@
 """Focal lengths of the camera."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -8,7 +9,10 @@ import numpy as np
 from ...geometry.arrays import namespace
 from ...records.rig import Rig, Sharing
 from ...rendering.coordinates import FrameModel
-from .block import Floats, LogarithmBlock, Value, register_block
+from .block import Floats, LogarithmBlock, Suspect, Value, register_block
+
+_FOCAL_STD, _ASPECT_STD = 0.003, 0.001
+"""Of a careful calibration, relative."""
 
 
 @register_block
@@ -38,3 +42,16 @@ class CameraFocal(LogarithmBlock):
     def prior_std(self, rig: Rig, value: Value) -> Floats | None:
         std = rig.camera.K_std
         return None if std is None else np.array(std[:2]) / np.exp(value)
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        std = self.prior_std(rig, value)
+        if std is not None:
+            return np.diag(1 / std)
+        return np.array([[0.5 / _FOCAL_STD, 0.5 / _FOCAL_STD], [-1 / _ASPECT_STD, 1 / _ASPECT_STD]])
+
+    def suspects(self, names: Sequence[str]) -> list[Suspect]:
+        """Return both focal lengths together, and their ratio."""
+        return [
+            Suspect("focal", "camera focal length", np.array([0.01, 0.01]), "%"),
+            Suspect("aspect", "camera aspect ratio", np.array([-0.005, 0.005]), "%"),
+        ]

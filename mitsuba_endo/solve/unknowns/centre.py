@@ -9,6 +9,9 @@ from ...records.rig import Rig
 from ...rendering.coordinates import FrameModel
 from .block import Floats, NaturalScales, Value, VectorBlock, register_block
 
+_STD_PX = 3.0
+"""Of a careful calibration."""
+
 
 @register_block
 class Centre(VectorBlock):
@@ -29,3 +32,6 @@ class Centre(VectorBlock):
 
     def scales(self, value: Value, scene: NaturalScales) -> Floats:
         return np.full(2, scene.focal)
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        return np.eye(2) / _STD_PX

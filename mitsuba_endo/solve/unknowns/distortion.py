@@ -8,10 +8,13 @@ import numpy as np
 from ...geometry.distortion import BrownDistortion
 from ...records.rig import Rig
 from ...rendering.coordinates import FrameModel
-from .block import Floats, VectorBlock, register_block
+from .block import Floats, Value, VectorBlock, register_block
 
 _LEAST_TERMS = 2
 """Coefficients that are unknowns where the rig names none: k1 and k2."""
+
+_STD = (0.005, 0.01, 0.001, 0.001, 0.01)
+"""Of a careful calibration."""
 
 
 @register_block
@@ -30,3 +33,6 @@ class Distortion(VectorBlock):
 
     def attach(self, model: FrameModel, value: Any) -> FrameModel:
         return replace(model, projector=model.projector.with_(distortion=BrownDistortion(value)))
+
+    def doubt(self, rig: Rig, value: Value) -> Floats:
+        return np.diag(1 / np.array(_STD[: len(value)]))
