@@ -47,6 +47,7 @@ def handedness(maps: Sequence[CorrespondenceMap], _rig: Rig) -> list[Finding]:
     """Refuse maps that no projector before an opaque surface can make, saying how they are turned.
 
     A projector that shines through a screen is refused as well: the model has no such surface.
+    Single frames turned among right ones are a warning: the solver leaves them out by name.
     """
     wrong: dict[str, list[str]] = {}
     for map_ in maps:
@@ -59,7 +60,7 @@ def handedness(maps: Sequence[CorrespondenceMap], _rig: Rig) -> list[Finding]:
             f"{_said(name)} (the map turns the other way round than any opaque surface allows)",
             f"{frames_named(frames)}: map",
             MENDING[name],
-            refused=True,
+            refused=sum(map(len, wrong.values())) == len(maps),
         )
         for name, frames in wrong.items()
     ]

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.sanity.examine import examine
 from mitsuba_endo.sanity.handedness import handedness, local_jacobians, positive_share
+from mitsuba_endo.solve.frames.initialisation import without_faults
 from tests.rigs import Rig
 from tests.sanity.given import map_of, noisy, record, thinned
 
@@ -69,9 +70,23 @@ def test_sparse_mirrored_map():
 
 
 def test_refusal_names_frames_and_what_to_do():
-    """Oracle: the contract; one mirrored frame among two is refused by its name."""
+    """Oracle: the contract; where every frame is mirrored, they are refused by their names."""
     rig = noisy(5)
-    maps = [map_of(rig.q, "a.exr"), map_of(WRONG["x_mirrored"](rig), "b.exr")]
-    with pytest.raises(InputError, match=r"^b\.exr: map: projector\.x runs against") as error:
+    maps = [map_of(WRONG["x_mirrored"](rig), name) for name in ("a.exr", "b.exr")]
+    with pytest.raises(
+        InputError, match=r"^a\.exr, b\.exr: map: projector\.x runs against"
+    ) as error:
         examine(maps, record(rig))
     assert "store width - 1 - x" in str(error.value)
+
+
+def test_one_mirrored_frame_among_right_ones_is_named_and_left_out():
+    """Oracle: the contract; a warning names the frame, and the solver does without it."""
+    rig = noisy(5)
+    maps = [map_of(rig.q, "a.exr"), map_of(WRONG["x_mirrored"](rig), "b.exr")]
+    (warning,) = [w for w in examine(maps, record(rig)).warnings if "runs against" in w]
+    assert warning.startswith("b.exr: map: projector.x runs against")
+    kept, left_out = without_faults(maps, record(rig))
+    assert [m.name for m in kept] == ["a.exr"]
+    assert [f.name for f in left_out] == ["b.exr"]
+    assert "runs against" in left_out[0].reason

@@ -78,7 +78,7 @@ def garbage(kind: str, views: Views) -> np.ndarray:
         ("empty", "0 usable correspondences"),
         ("one pattern pixel", "span only"),
         ("beyond the pattern", "lie on the pattern"),
-        ("x and y swapped", "against view0"),
+        ("x and y swapped", "are swapped"),
         ("another surface", "against view0"),
     ],
 )

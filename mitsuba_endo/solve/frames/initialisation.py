@@ -11,6 +11,7 @@ from ...records.consistency import fault
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
 from ...records.solution import LeftOut
+from ...sanity.handedness import handedness
 from ...start.clean import clean_map
 from ...start.known import known_start, start_at_pose
 from ...start.plane import plane_start
@@ -85,8 +86,8 @@ def usable_starts(
 def without_faults(
     maps: list[CorrespondenceMap], rig: Rig
 ) -> tuple[list[CorrespondenceMap], list[LeftOut]]:
-    """Leave out maps that cannot belong to the rig."""
-    faults = [fault(map_, rig) for map_ in maps]
+    """Leave out maps that cannot belong to the rig, or to any surface."""
+    faults = [fault(m, rig) or next(iter(handedness([m], rig)), None) for m in maps]
     left_out = [LeftOut(name=m.name, reason=f.what) for m, f in zip(maps, faults, strict=True) if f]
     return [m for m, f in zip(maps, faults, strict=True) if f is None], left_out
 
