@@ -49,6 +49,7 @@ def use(*variants: str) -> str:
     if variant.startswith("llvm"):
         _check_llvm(todo)
     _set_threads()
+    _quieten()
     return variant
 
 
@@ -117,6 +118,16 @@ def _check_llvm(todo: str) -> None:
             "DRJIT_LIBLLVM_PATH",
             todo,
         )
+
+
+def _quieten() -> None:
+    """Leave out Dr.Jit's own lines about kernels that it could not keep on a full disk.
+
+    They change no result, and whoever asked has a sentence of ours about the disk.
+    """
+    import drjit as dr
+
+    dr.set_log_level(dr.LogLevel.Error)
 
 
 def _set_threads() -> None:
