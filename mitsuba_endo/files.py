@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import InputError
-from .folder_mark import Kind, read_mark, remove_marked, write_mark
+from .folder_mark import Kind, Mark, read_mark, remove_marked, write_mark
 from .litter import aside_of, remove
 from .outputs import check_folder, check_name
 
@@ -59,7 +59,7 @@ def atomic_folder(path: str | Path, kind: Kind) -> Iterator[Path]:
             be written.
     """
     path = Path(path).absolute()
-    check_folder(path, kind)
+    _check_steady(path, kind)
     _make_parent(path)
     aside = aside_of(path, "partial")
     try:
@@ -94,22 +94,58 @@ def _replace_folder(aside: Path, path: Path, kind: Kind) -> None:
     if not path.exists():
         os.replace(aside, path)
         return
-    check_folder(path, kind)  # once more: files may have come since the work began
-    mark = read_mark(path)
+    _check_steady(path, kind)  # once more: files may have come since the work began
     old = aside_of(path, "old")
     os.replace(path, old)
+    mark = read_mark(old)  # nobody else moves it there
     try:
         os.replace(aside, path)
     except BaseException:  # Ctrl-C between the two renames must not lose the older result
+        _give_back(old, path, mark)
+        raise
+    _remove_old(old, mark)
+
+
+def _give_back(old: Path, path: Path, mark: Mark | None) -> None:
+    """Put an older result back, unless another process has put its own in its place."""
+    with contextlib.suppress(OSError):
         if not path.exists():
             os.replace(old, path)
-        elif mark:
-            remove_marked(old, mark)
-        raise
+            return
+    _remove_old(old, mark)
+
+
+def _remove_old(old: Path, mark: Mark | None) -> None:
     if mark:
         remove_marked(old, mark)
     else:  # it was empty
         old.rmdir()
+
+
+def _check_steady(path: Path, kind: Kind) -> None:
+    """Check a folder as :func:`check_folder` does, again if it was replaced meanwhile.
+
+    Another process that writes the same folder takes it away between two looks.
+    """
+    for left in reversed(range(_TRIES)):
+        before = _identity(path)
+        try:
+            check_folder(path, kind)
+        except InputError:
+            steady = before is not None and _identity(path) == before
+            if steady or not left:
+                raise
+        else:
+            return
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Return what tells a folder from another at the same path, None where there is none."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_ctime_ns
 
 
 def _make_parent(path: Path) -> None:
