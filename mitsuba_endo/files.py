@@ -143,7 +143,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
     """Return what tells a folder from another at the same path, None where there is none."""
     try:
         found = path.lstat()
-    except OSError:
+    except (OSError, ValueError):  # no such folder, or a name that none can have
         return None
     return found.st_ino, found.st_ctime_ns
 
