@@ -20,7 +20,7 @@ from ..costs.problem import Evaluation, Problem, evaluate, gradient
 from ..options import Options
 from ..unknowns.block import BLOCKS
 from ..unknowns.state import State
-from .minimise import OnIteration, register_minimiser
+from .minimise import OnIteration, iterate, register_minimiser
 from .result import OptimisationResult, trace_row
 
 Floats = NDArray[np.float64]
@@ -98,19 +98,7 @@ class Adam:
         noise: NoiseScale,
         on_iteration: OnIteration | None = None,
     ) -> OptimisationResult:
-        now = self.init(problem, state, noise)
-        try:
-            while now.outcome is None:
-                windows = len(now.trace)
-                now = self.step(now)
-                if on_iteration is not None and len(now.trace) > windows:
-                    on_iteration(now.trace[-1], now.at.state)
-        except KeyboardInterrupt:
-            if not now.trace:
-                raise
-            now = replace(now, outcome=Outcome.INTERRUPTED)
-        assert now.outcome is not None
-        return OptimisationResult(now.outcome, now.at, now.noise, list(now.trace))
+        return iterate(self.init(problem, state, noise), self.step, on_iteration)
 
     def init(self, problem: Problem, state: State, noise: NoiseScale) -> Iterate:
         """Evaluate the starting state."""

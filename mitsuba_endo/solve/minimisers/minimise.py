@@ -1,12 +1,13 @@
 """Minimisers by name, and running one on a prepared problem."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from ...errors import InputError
 from ...records.calibration import TraceRow
+from ...records.solution import Outcome
 from ..costs.loss import NoiseScale
-from ..costs.problem import Problem
+from ..costs.problem import Evaluation, Problem
 from ..options import Options
 from ..unknowns.state import State
 from .result import OptimisationResult
@@ -52,6 +53,41 @@ def register_minimiser(
         return make
 
     return register
+
+
+class Standing(Protocol):
+    """Where a minimiser stands, as far as whoever runs it needs to know."""
+
+    @property
+    def at(self) -> Evaluation: ...
+    @property
+    def noise(self) -> NoiseScale: ...
+    @property
+    def trace(self) -> tuple[TraceRow, ...]: ...
+    @property
+    def outcome(self) -> Outcome | None: ...
+
+
+S = TypeVar("S", bound=Standing)
+
+
+def iterate(now: S, step: Callable[[S], S], on_iteration: OnIteration | None) -> OptimisationResult:
+    """Step until a minimiser says how it ended, or the user stops it.
+
+    Raises:
+        KeyboardInterrupt: the user stopped before there was anything to go on from.
+    """
+    try:
+        while now.outcome is None:
+            rows = len(now.trace)
+            now = step(now)
+            if on_iteration is not None and len(now.trace) > rows:
+                on_iteration(now.trace[-1], now.at.state)
+    except KeyboardInterrupt:
+        if not now.trace:
+            raise
+        return OptimisationResult(Outcome.INTERRUPTED, now.at, now.noise, list(now.trace))
+    return OptimisationResult(now.outcome, now.at, now.noise, list(now.trace))
 
 
 def minimise(
