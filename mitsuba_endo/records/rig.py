@@ -157,6 +157,8 @@ class Projector(Record):
     focal: Focal = Focal()
     centre: Vector2 | None = None
     """Principal point, pattern pixels; default: the middle of the pattern."""
+    centre_std: Annotated[list[Length], Field(min_length=2, max_length=2)] | None = None
+    """Standard deviations of ``centre``, pattern pixels: a prior where it is an unknown."""
     aspect: Annotated[float, Field(ge=0.01, le=100)] = 1.0
     """fy / fx."""
     distortion: Annotated[list[Real], Field(max_length=MAX_PROJECTOR_DISTORTION)] = []
@@ -251,7 +253,8 @@ class Share(Record):
     projector_pose: Sharing = "per_frame"
     focal: Sharing | None = None
     """Default: ``shared`` if ``projector.focal.refine``, else ``fixed``."""
-    centre: Sharing = "fixed"
+    centre: Sharing | None = None
+    """Default: ``fixed``; ``shared`` where it is not given and found beside the middle."""
     aspect: Sharing = "fixed"
     distortion: Sharing = "fixed"
 

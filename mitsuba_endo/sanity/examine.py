@@ -15,10 +15,10 @@ from .finding import Check, Finding
 from .handedness import handedness
 from .lens_fold import lens_fold
 from .missing_values import missing_values
-from .projector_intrinsics import assumed_centre, projector_focal
+from .projector_intrinsics import projector_focal
 
 CHECKS: tuple[Check, ...] = (
-    focal_units, principal_point, handedness, lens_fold, assumed_centre, projector_focal
+    focal_units, principal_point, handedness, lens_fold, projector_focal
 )  # fmt: skip
 """In the order in which they run: a camera matrix in other units also folds its lens."""
 

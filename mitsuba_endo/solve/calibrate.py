@@ -20,7 +20,7 @@ from .inference.fit import Fit
 from .inference.model_choice import cheaper, choose_law
 from .minimisers.minimise import Progress, minimiser_of
 from .options import Options
-from .pipeline import Job, Optimised, infer, optimise, optimise_again
+from .pipeline import Job, Optimised, infer, optimise, optimise_again, with_centre
 from .reporting.assemble import assemble
 
 
@@ -85,6 +85,7 @@ def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:
     parts = 2 * len(jobs) if len(jobs) > 1 else 1  # an only one has no others to start from
     last = _part(say, parts, parts)
     stopping = _part(lambda share, step: say(share, f"Stopping: {step.lower()}"), parts, parts)
+    jobs = [with_centre(job, _part(say, i, parts)) for i, job in enumerate(jobs)]
     done: list[Optimised] = []
     for i, job in enumerate(jobs):
         done.append(optimise(job, _part(say, i, parts)))

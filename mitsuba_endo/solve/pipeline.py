@@ -14,10 +14,12 @@ from ..records.solution import LeftOut, Outcome
 from ..start.registration import RangeImage, Registration, register_frames
 from ..start.result import Start
 from .costs.problem import Problem, make_problem
+from .costs.registry import priors_of
 from .frames.alone import solve_alone
 from .frames.initialisation import common_start, usable_starts, without_faults, without_repeats
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
 from .frames.joint_mesh import joint_mesh_problem
+from .frames.projector_centre import centre_is_assumed, resumed_centre, searched_centre
 from .frames.restart import with_restarts
 from .frames.resume import resumed_maps, resumed_problem
 from .frames.single import separate_surfaces
@@ -54,6 +56,8 @@ class Job:
     """Seconds of every stage, filled in while solving."""
     history: History = field(default_factory=History)
     """How the last optimisation went, likewise."""
+    notes: tuple[str, ...] = ()
+    """What was assumed before it began."""
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -80,6 +84,21 @@ class Optimised:
     """What its start left free."""
 
 
+def with_centre(job: Job, say: Progress) -> Job:
+    """Return the job with the projector's centre looked for, where a lens has none given."""
+    if not centre_is_assumed(job.rig, job.law):
+        return job
+    say(0.0, "Looking for the projector's centre")
+    with job.timed("start"):
+        if job.resume is not None:
+            rig, note = resumed_centre(job.resume, job.rig)
+        else:
+            sound, _ = without_faults(job.maps, job.rig)
+            layout = job.layout(len(job.maps))
+            rig, note = searched_centre(sound, job.camera, job.rig, layout, job.options)
+    return replace(job, rig=rig, notes=(note,))
+
+
 def optimise(job: Job, say: Progress) -> Optimised:
     """Search for a start and optimise.
 
@@ -95,11 +114,21 @@ def optimise(job: Job, say: Progress) -> Optimised:
 
 
 def optimise_again(job: Job, other: OptimisationResult, say: Progress) -> OptimisationResult:
-    """Optimise under the job's projection model from where another model's result ended."""
+    """Optimise under the job's projection model from where another model's result ended.
+
+    The unknowns are the job's own: what another model needed as one, such as a lens's centre that
+    was not given, stays as this job's rig has it.
+    """
     old = other.problem
-    problem = make_problem(old.observed, old.surfaces, other.state, old.layout, job.law, old.others)
+    layout = job.layout(old.layout.frames)
+    of_frames = {
+        name: [other.state.at(name, k) for k in range(layout.frames)] for name in old.layout.owners
+    }
+    state = layout.state(other.state.surfaces, of_frames)
+    terms = [*old.smoothness, *priors_of(job.rig, layout)]
+    problem = make_problem(old.observed, old.surfaces, state, layout, job.law, terms)
     aside = replace(job, history=History())  # what is kept is how the model's own way went
-    return _optimise(aside, problem, other.state, _reporter(job, say, 0.1))[0]
+    return _optimise(aside, problem, state, _reporter(job, say, 0.1))[0]
 
 
 def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Optimised:
@@ -287,6 +316,6 @@ def infer(job: Job, done: Optimised, say: Progress) -> Fit:
         known = uncertainty(result, reported, job.options.jackknife)
     if model is not None:
         model = replace(model, understated=max(known.sigma / result.noise.sigma, 1.0))
-    given = [m.name for m in job.maps]
+    given, notes = [m.name for m in job.maps], [*job.notes, *done.notes]
     return Fit(job.law, done.maps, done.left_out, given, result, reported, done.result, model,
-               known, done.notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip
+               known, notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip

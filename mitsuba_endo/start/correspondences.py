@@ -9,6 +9,9 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES
 
+PROPOSE_POINTS, REFINE_POINTS = 500, 1500
+"""Correspondences of a frame from which poses are proposed, and on which they are refined."""
+
 
 @dataclass(frozen=True, eq=False)
 class Correspondences:

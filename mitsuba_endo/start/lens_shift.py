@@ -19,11 +19,17 @@ from mitsuba_endo.geometry.laws import ProjectorModel
 
 from .choose import MIN_SCALE_PX, REDESCENDING, RefinementProblem, refine, robust_scale
 from .clean import clean_map, noise_scale
-from .correspondences import Correspondences, checked_map, gather, spread_sample
+from .correspondences import (
+    PROPOSE_POINTS,
+    REFINE_POINTS,
+    Correspondences,
+    checked_map,
+    gather,
+    spread_sample,
+)
 from .propose import distinct, focal_lengths, propose
 from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
 
-PROPOSE_POINTS, REFINE_POINTS = 500, 1500
 HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Centres tried first, of the pattern's height: lens shifts of up to 75 %, upwards or downwards."""
 MIDDLE = 0.5
@@ -65,25 +71,6 @@ class LensShift:
     """The same at the middle; infinite where no pose is possible there."""
     states: list[EpipolarState]
     """The calibration of every frame at ``centre``; empty where none is possible."""
-
-    @property
-    def note(self) -> str:
-        """What the user should know."""
-        x, y = self.centre
-        if not self.found:
-            return (
-                "The projector's centre was not given and no height of it is clearly better than "
-                "the pattern's middle, which is assumed."
-            )
-        middle = (
-            f"residuals fall from {self.middle_scale_px:.2g} to {self.scale_px:.2g} px"
-            if np.isfinite(self.middle_scale_px)
-            else "no pose is possible with the middle"
-        )
-        return (
-            f"The projector's centre was not given: ({x:.4g}, {y:.4g}) px was found along the "
-            f"pattern's height, at half of its width ({middle}). Give it if it is known."
-        )
 
 
 def frame_samples(

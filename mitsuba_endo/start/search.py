@@ -9,9 +9,15 @@ from mitsuba_endo.geometry.laws import ProjectorModel
 
 from .choose import Minimum, RefinementProblem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
-from .correspondences import Correspondences, checked_map, gather, spread_sample
+from .correspondences import (
+    PROPOSE_POINTS,
+    REFINE_POINTS,
+    Correspondences,
+    checked_map,
+    gather,
+    spread_sample,
+)
 from .depth_image import depth_image
-from .lens_shift import PROPOSE_POINTS, REFINE_POINTS, FrameSamples, find_lens_shift
 from .notes import remarks
 from .propose import distinct, focal_lengths, propose
 from .refine import evaluate
@@ -32,7 +38,6 @@ def search_start(
     *,
     refine_focal: bool = True,
     focal_guess: float | None = None,
-    search_centre: bool = False,
     seed: int = 0,
 ) -> Start:
     """Find projector pose, focal length and depth from one correspondence map.
@@ -49,8 +54,6 @@ def search_start(
         size: pattern width and height, pixels.
         refine_focal: search the focal length; False keeps it fixed.
         focal_guess: with ``refine_focal`` one more focal length to propose, else its fixed value.
-        search_centre: look for the projector's centre along the pattern's height, for a lens whose
-            centre is not given; see :mod:`.lens_shift`.
         seed: of the samples drawn.
 
     Raises:
@@ -69,19 +72,10 @@ def search_start(
     some = spread_sample(data, REFINE_POINTS, camera.width, rng)
     many = spread_sample(data, FINISH_POINTS, camera.width, rng)
 
-    noise, notes, known = noise_scale(q, usable), [], []
-    if search_centre:
-        shift = find_lens_shift(
-            [FrameSamples(few, some, noise)], projector, size, refine_focal=refine_focal,
-            focal_guess=focal_guess,
-        )  # fmt: skip
-        projector, notes = projector.with_(centre=shift.centre), [shift.note]
-        known = [(s.pose, float(s.projector.focal)) for s in shift.states]
-
     focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
-    problem = RefinementProblem(projector, refine_focal, bounds, noise)
-    minima = refine(problem, [*known, *((p.pose, p.focal) for p in proposals)], some)
+    problem = RefinementProblem(projector, refine_focal, bounds, noise_scale(q, usable))
+    minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
     minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)
     found = minima[0].state
@@ -93,7 +87,7 @@ def search_start(
         depth=seen.depth,
         used=seen.used,
         scale_px=robust_scale(found),
-        notes=[*notes, *remarks(minima, many, refine_focal)],
+        notes=remarks(minima, many, refine_focal),
         alternatives=[m.candidate for m in minima[1:]],
     )
 

@@ -26,7 +26,6 @@ def test_mirrored():
 @pytest.mark.parametrize(
     ("folder", "map_name", "rig", "kinds"),
     [
-        ("11_lens_shift_default_centre", "map.exr", "asked.yaml", ["centre_assumed"]),
         ("11_lens_shift_default_centre", "map.exr", "rig.yaml", []),
         ("15_zero_missing", "m03_zeromissing.npz", "m03_zeromissing.yaml", ["missing_value"]),
         ("22_lens_beyond_its_range", "map.exr", "m40_folding.yaml", ["lens_fold"]),

@@ -12,16 +12,6 @@ RIG = rigs.random_rig(1)
 MAP = map_of(RIG.q)
 
 
-@pytest.mark.parametrize(
-    ("law", "told"), [("pinhole", True), ("auto", True), ("direction_cosine", False)]
-)
-def test_assumed_centre(law: str, told: bool):
-    """Oracle: only a lens has a centre that is often off the pattern's middle."""
-    warnings = examine([MAP], record(RIG, law=law, centre=None)).warnings
-    assert [("assumed" in w and "(255.5, 199.5)" in w) for w in warnings] == [True] * told
-    assert examine([MAP], record(RIG, law=law, centre=[255.5, 199.5])).warnings == []
-
-
 def test_projector_focal_in_millimetres():
     """Oracle: 8 px before 512 would spread over 176 degrees; a start of 300 px is plausible."""
     (finding,) = examine([MAP], record(RIG, focal=8.0)).findings
@@ -48,8 +38,8 @@ def test_no_scale_no_distance():
 
 def test_findings_explain_a_later_failure():
     """Oracle: the contract; an error inside is given the findings, and stays as it is without."""
-    examined = examine([MAP], record(RIG, law="pinhole", centre=None))
-    told = r"no pose; look; a likely cause: projector\.centre: not"
+    examined = examine([MAP], record(RIG, focal=8.0))
+    told = r"no pose; look; a likely cause: projector\.focal: 8 px"
     with pytest.raises(InputError, match=told), examined.told_on_failure():
         raise InputError("no pose", todo="look")
     with pytest.raises(InputError, match=r"^no pose; look\.$"), Examined([], []).told_on_failure():

@@ -8,8 +8,7 @@ import pytest
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.start.lens_shift import find_lens_shift, frame_samples
-from mitsuba_endo.start.search import search_start
+from mitsuba_endo.start.lens_shift import LensShift, find_lens_shift, frame_samples
 from tests import rigs
 
 SIZE = (512, 400)
@@ -30,28 +29,27 @@ def _rig(height: float) -> rigs.Rig:
     return rigs.with_outliers(rigs.with_noise(rig, 0.3, 1), 0.1, 1)
 
 
+def _found(rig: rigs.Rig) -> LensShift:
+    frame = frame_samples(rig.q, rig.camera, np.random.default_rng(0))
+    return find_lens_shift([frame], rig.unknown_projector.with_(centre=MIDDLE), SIZE)
+
+
 @pytest.mark.parametrize("height", [0.0, 1.07])
 def test_finds_a_shifted_centre(height: float):
     """Oracle: the rig's centre and focal length; noise 0.3 px and 10 % outliers allow 6 px, 1 %."""
     rig = _rig(height)
-    start = search_start(
-        rig.q, rig.camera, rig.unknown_projector.with_(centre=MIDDLE), SIZE, search_centre=True
-    )
-    assert start.projector.centre[0] == MIDDLE[0]
-    assert start.projector.centre[1] == pytest.approx(rig.projector.centre[1], abs=6)
-    assert start.projector.focal == pytest.approx(600, rel=0.01)
-    assert "centre was not given" in start.notes[0]
-    assert "was found" in start.notes[0]
+    shift = _found(rig)
+    assert shift.found
+    assert shift.centre[0] == MIDDLE[0]
+    assert shift.centre[1] == pytest.approx(rig.projector.centre[1], abs=6)
+    assert shift.states[0].projector.focal == pytest.approx(600, rel=0.01)
 
 
 def test_keeps_the_middle_where_it_is_right():
-    """Oracle: at the rig's own centre nothing else is clearly better; the start is as without."""
-    rig = _rig(0.5)
-    start = search_start(rig.q, rig.camera, rig.unknown_projector, SIZE, search_centre=True)
-    plain = search_start(rig.q, rig.camera, rig.unknown_projector, SIZE)
-    assert start.projector.centre == MIDDLE
-    assert start.projector.focal == pytest.approx(plain.projector.focal, rel=1e-3)
-    assert "the pattern's middle, which is assumed" in start.notes[0]
+    """Oracle: at the rig's own centre nothing else is clearly better."""
+    shift = _found(_rig(0.5))
+    assert not shift.found
+    assert shift.centre == MIDDLE
 
 
 def test_frames_that_share_a_centre():
@@ -80,6 +78,7 @@ def test_finds_a_real_shift(number: int):
         tuple(c["dist_proj"]),
     )  # fmt: skip
     camera = CameraModel("opencv", width, height, c["K_cam"], tuple(c["dist_cam"]))
-    start = search_start(c["map"], camera, projector, (w, h), search_centre=True)
-    assert start.projector.centre[1] == pytest.approx(K[1, 2], abs=20)
-    assert start.projector.focal == pytest.approx(K[0, 0], rel=0.01)
+    frame = frame_samples(c["map"], camera, np.random.default_rng(0))
+    shift = find_lens_shift([frame], projector, (w, h))
+    assert shift.centre[1] == pytest.approx(K[1, 2], abs=20)
+    assert shift.states[0].projector.focal == pytest.approx(K[0, 0], rel=0.01)

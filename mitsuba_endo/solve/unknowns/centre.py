@@ -33,5 +33,10 @@ class Centre(VectorBlock):
     def scales(self, value: Value, scene: NaturalScales) -> Floats:
         return np.full(2, scene.focal)
 
+    def prior_std(self, rig: Rig, value: Value) -> Floats | None:
+        std = rig.projector.centre_std
+        return None if std is None else np.array(std, float)
+
     def doubt(self, rig: Rig, value: Value) -> Floats:
-        return np.eye(2) / _STD_PX
+        std = self.prior_std(rig, value)
+        return np.diag(1 / (np.full(2, _STD_PX) if std is None else std))
