@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from mitsuba_endo import backend
-from mitsuba_endo.decode.network import load_network
+from mitsuba_endo.decoding.network import load_network
 from scripts.benchmarks.decoder_scenes import PATTERN, Kind
 from scripts.benchmarks.image import judge, photograph_of
 from scripts.benchmarks.photograph_cache import cached_shot

@@ -19,7 +19,7 @@ from mitsuba_endo.learn.loop import TrainingPlan, train
 from mitsuba_endo.learn.validation import validation_images
 
 Option = typer.Option
-SHIPPED = Path(__file__).parents[1] / "mitsuba_endo/decode/weights/decoder.onnx"
+SHIPPED = Path(__file__).parents[1] / "mitsuba_endo/decoding/weights/decoder.onnx"
 
 
 def main(

@@ -10,8 +10,8 @@ import typer
 from .console import EXIT_FAULT, Debug, Json, Quiet, Session, session
 
 if TYPE_CHECKING:
-    from ..decode.grid.decode import DecodedGrid
-    from ..decode.image_files import ImageFrame
+    from ..decoding.grid.decode import DecodedGrid
+    from ..decoding.image_files import ImageFrame
     from ..records.rig import Rig
     from ..refine.decoded import DecodedMap
 
@@ -120,10 +120,10 @@ def decode_into(
         InputError: an image that cannot be read or is not of the rig's size, a wrong pattern or
             network.
     """
-    from ..decode.grid.decode import decode_image
-    from ..decode.image_files import read_frames
-    from ..decode.network import load_network
-    from ..decode.pattern_option import coded_grid
+    from ..decoding.grid.decode import decode_image
+    from ..decoding.image_files import read_frames
+    from ..decoding.network import load_network
+    from ..decoding.pattern_option import coded_grid
     from ..refine.decoded import decoded_map
 
     grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
@@ -161,7 +161,7 @@ def decode_images(
         InputError: maps and images at once, a pattern for maps, no pattern found in any image, or
             as :func:`decode_into`.
     """
-    from ..decode.image_files import is_images
+    from ..decoding.image_files import is_images
     from ..errors import InputError
     from ..records.rig import load_rig
 

@@ -10,8 +10,8 @@ from .console import Advance, Debug, Json, Quiet, Session, session
 from .stack_options import Height, Periods, Steps, Stripe, Width, numbers
 
 if TYPE_CHECKING:
-    from ..decode.stack import DecodedStack
-    from ..decode.stack_reading import StackReading
+    from ..decoding.stack import DecodedStack
+    from ..decoding.stack_reading import StackReading
 
 Images = Annotated[
     list[Path],
@@ -73,10 +73,10 @@ def decode_stack(
     they are not stated, and said. Names as the command patterns gives them state all of it.
     """
     with session(quiet, as_json, debug) as output:
-        from ..decode.conventions import read_convention
-        from ..decode.stack import decode_stack as decode
-        from ..decode.stack_files import StackFiles, stack_paths
-        from ..decode.stack_reading import StackRequest, find_reading, read_by_names
+        from ..decoding.conventions import read_convention
+        from ..decoding.stack import decode_stack as decode
+        from ..decoding.stack_files import StackFiles, stack_paths
+        from ..decoding.stack_reading import StackRequest, find_reading, read_by_names
         from ..outputs import prepare_file
         from ..records.correspondence import WEIGHT, check_map_path, save_map
 

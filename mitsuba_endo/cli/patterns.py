@@ -19,7 +19,7 @@ from .stack_options import (
 )
 
 if TYPE_CHECKING:
-    from ..decode.plan import StackPlan
+    from ..decoding.plan import StackPlan
 
 Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
 
@@ -40,7 +40,7 @@ def patterns(
 ) -> None:
     """Write the images of a Gray-code or phase-shift stack, numbered in order, to be projected."""
     with session(quiet, as_json, debug) as output:
-        from ..decode.stack_files import save_patterns
+        from ..decoding.stack_files import save_patterns
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
 
@@ -52,7 +52,7 @@ def patterns(
 
 
 def _command(plan: "StackPlan") -> str:
-    from ..decode.conventions import own_convention
+    from ..decoding.conventions import own_convention
 
     parts = [
         f"mitsuba-endo decode-stack FOLDER --pattern {plan.kind}",

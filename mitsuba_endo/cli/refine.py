@@ -46,7 +46,7 @@ def refine(
     If the image confirms nothing, the map is written as it was, and the exit code is 1.
     """
     with session(quiet, as_json, debug) as output:
-        from ..decode.image_files import full_scale, read_image
+        from ..decoding.image_files import full_scale, read_image
         from ..records.correspondence import check_map_path, load_map, write_map
         from ..records.rig import load_rig
         from ..refine.options import RefineOptions
@@ -72,7 +72,7 @@ def refine(
 
 
 def _pattern(name: str, rig: "Rig", gamma: float) -> "PatternImage":
-    from ..decode.pattern_option import coded_grid
+    from ..decoding.pattern_option import coded_grid
     from ..errors import InputError
     from ..refine.pattern_image import grid_image, load_pattern
 

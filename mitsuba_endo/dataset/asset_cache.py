@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid_pattern import COLOURS, CodedGrid
+from ..decoding.grid_pattern import COLOURS, CodedGrid
 from ..files import atomic_path
 from ..litter import sweep
 from ..shapes import Mesh, make_shape

@@ -137,7 +137,7 @@ class ProjectorRanges(Section):
 
 
 class PatternRanges(Section):
-    """The coded grid: ranges of the parameters of :class:`~mitsuba_endo.decode.CodedGrid`."""
+    """The coded grid: ranges of the parameters of :class:`~mitsuba_endo.decoding.CodedGrid`."""
 
     variants: PositiveInt = 16
     """Different patterns in the dataset; each is drawn once and used by many samples."""

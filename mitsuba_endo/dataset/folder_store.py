@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.image_files import read_image
+from ..decoding.image_files import read_image
 from ..errors import InputError
 from ..files import atomic_folder
 from ..folder_mark import Kind

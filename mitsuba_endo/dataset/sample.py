@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.photograph import Photograph, load_scene, take_photograph
-from ..decode.grid_pattern import CodedGrid
+from ..decoding.grid_pattern import CodedGrid
 from ..geometry.endoscope import Endoscope
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform

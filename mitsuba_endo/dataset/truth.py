@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.creases import with_creases
-from ..decode.grid_pattern import CodedGrid
+from ..decoding.grid_pattern import CodedGrid
 from ..geometry.endoscope import Endoscope
 from ..shapes.mesh import Mesh
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..capture.effects import apply_effects
 from ..capture.settings import Effects
-from ..decode.grid_pattern import COLOURS
+from ..decoding.grid_pattern import COLOURS
 from .patterns import GridTexture
 from .scattering import spread
 from .textures import albedo, highlights

@@ -10,7 +10,7 @@ from torch import Tensor  # pyright: ignore[reportMissingImports]
 from torch.utils.data import Dataset  # pyright: ignore[reportMissingImports]
 
 from ..capture.effects import apply_effects
-from ..decode.normalise import normalise
+from ..decoding.normalise import normalise
 from .cache import ViewCache
 from .compose import (
     Targets,

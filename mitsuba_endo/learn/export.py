@@ -8,8 +8,8 @@ import onnx  # pyright: ignore[reportMissingImports]
 import torch  # pyright: ignore[reportMissingImports]
 from torch import nn  # pyright: ignore[reportMissingImports]
 
-from ..decode.network import STRIDE, describe
-from ..decode.normalise import INPUT_CHANNELS
+from ..decoding.network import STRIDE, describe
+from ..decoding.normalise import INPUT_CHANNELS
 from ..files import atomic_path
 
 OPSET = 17

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.network import Heads
+from ..decoding.network import Heads
 from .compose import Targets
 
 CONFIDENT = 0.5

@@ -5,8 +5,8 @@ from itertools import pairwise
 import torch  # pyright: ignore[reportMissingImports]
 from torch import Tensor, nn  # pyright: ignore[reportMissingImports]
 
-from ..decode.network import CHANNELS
-from ..decode.normalise import INPUT_CHANNELS
+from ..decoding.network import CHANNELS
+from ..decoding.normalise import INPUT_CHANNELS
 
 
 def _block(inputs: int, outputs: int) -> nn.Sequential:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid_pattern import CodedGrid
+from ..decoding.grid_pattern import CodedGrid
 
 TEXELS = 20
 """Texels per period."""

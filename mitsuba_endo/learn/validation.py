@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..capture.settings import Effects
-from ..decode.network import CHANNELS, read_heads
-from ..decode.normalise import normalise
+from ..decoding.network import CHANNELS, read_heads
+from ..decoding.normalise import normalise
 from .cache import ViewCache
 from .compose import Appearance, Targets, compose
 from .metrics import PixelMetrics, pixel_metrics

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from ..decode.grid.decode import DecodedGrid
-from ..decode.grid_pattern import CodedGrid
+from ..decoding.grid.decode import DecodedGrid
+from ..decoding.grid_pattern import CodedGrid
 from ..records.correspondence import CorrespondenceMap
 from .pattern_image import grid_image
 from .refine_map import RefinedMap, refine_map

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid_pattern import CodedGrid
-from ..decode.image_files import full_scale, read_image
-from ..decode.normalise import one_channel
+from ..decoding.grid_pattern import CodedGrid
+from ..decoding.image_files import full_scale, read_image
+from ..decoding.normalise import one_channel
 from ..errors import InputError
 from .cells import Image
 

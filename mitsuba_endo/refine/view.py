@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.normalise import one_channel
+from ..decoding.normalise import one_channel
 from .cells import Image, padded
 
 SATURATED = 0.98

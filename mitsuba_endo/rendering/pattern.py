@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 from pydantic.dataclasses import dataclass
 
-from ..decode.grid_pattern import COLOURS, CodedGrid
+from ..decoding.grid_pattern import COLOURS, CodedGrid
 from ..errors import InputError
 from ..shapes.registry import CHECKED, Positive
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid_pattern import CodedGrid, GridTruth
+from ..decoding.grid_pattern import CodedGrid, GridTruth
 from ..description import read_description
 from .pattern import parse_pattern
 from .scene import LoadedScene

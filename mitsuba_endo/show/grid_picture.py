@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decode.grid.decode import DecodedGrid
+from ..decoding.grid.decode import DecodedGrid
 
 WIDTH = 1200
 """Least width of the picture, pixels; the image is enlarged by a whole factor."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..decode.grid_pattern import GridTruth
+from ..decoding.grid_pattern import GridTruth
 from ..records.correspondence import write_exr
 
 GRID_TRUTH = "truth_grid.exr"

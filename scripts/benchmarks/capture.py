@@ -12,7 +12,7 @@ from mitsuba_endo.capture.effects.sensor_noise import sensor_noise
 from mitsuba_endo.capture.effects.speckle import speckle
 from mitsuba_endo.capture.photograph import photograph
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Light
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform

@@ -10,8 +10,8 @@ from functools import partial
 
 import numpy as np
 
-from mitsuba_endo.decode.grid.decode import decode_image
-from mitsuba_endo.decode.network import Network, load_network
+from mitsuba_endo.decoding.grid.decode import decode_image
+from mitsuba_endo.decoding.network import Network, load_network
 
 from .decoder_scenes import KINDS, PATTERN, Errors, Kind, Shot, compare, shoot
 from .report import Figure, timed

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from mitsuba_endo.decode.grid.decode import decode_image
-from mitsuba_endo.decode.network import Network, load_network
+from mitsuba_endo.decoding.grid.decode import decode_image
+from mitsuba_endo.decoding.network import Network, load_network
 from mitsuba_endo.evaluate.shape import compare_shape
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate

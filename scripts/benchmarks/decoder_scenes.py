@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.capture.effects import apply_effects
 from mitsuba_endo.capture.photograph import photograph
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Light, Tissue
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.capture.effects import apply_effects
 from mitsuba_endo.capture.settings import Effects
-from mitsuba_endo.decode.grid.decode import decode_image
-from mitsuba_endo.decode.network import Network, load_network
+from mitsuba_endo.decoding.grid.decode import decode_image
+from mitsuba_endo.decoding.network import Network, load_network
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.refine.pattern_image import grid_image
 from mitsuba_endo.refine.refine_map import RefinedMap, refine_map

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Light, Tissue
-from mitsuba_endo.decode.grid_pattern import COLOURS, CodedGrid
+from mitsuba_endo.decoding.grid_pattern import COLOURS, CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform

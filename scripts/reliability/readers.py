@@ -112,7 +112,7 @@ def _checkpoint(folder: Path) -> None:
 
 def _frames(name: str) -> Use:
     def use(folder: Path) -> None:
-        from mitsuba_endo.decode.image_files import read_frames
+        from mitsuba_endo.decoding.image_files import read_frames
 
         for _ in read_frames([folder / name]):
             pass
@@ -122,7 +122,7 @@ def _frames(name: str) -> Use:
 
 def _network(engine: str) -> Use:
     def use(folder: Path) -> None:
-        from mitsuba_endo.decode.network import describe, load_network
+        from mitsuba_endo.decoding.network import describe, load_network
 
         path = folder / "decoder.onnx"
         # With a checksum that is right: it is what the file holds that is to be refused.

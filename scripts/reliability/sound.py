@@ -136,7 +136,7 @@ def _meshes(folder: Path) -> None:
 def _network(folder: Path) -> None:
     from importlib.resources import files
 
-    weights = files("mitsuba_endo.decode") / "weights" / "decoder.onnx"
+    weights = files("mitsuba_endo.decoding") / "weights" / "decoder.onnx"
     (folder / "decoder.onnx").write_bytes(weights.read_bytes())
 
 

@@ -9,11 +9,11 @@ import pytest
 import yaml
 from scipy.ndimage import gaussian_filter
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.records.correspondence import load_map, read_exr
 from mitsuba_endo.records.rig import Camera
 from tests.cli.inputs import run
-from tests.decode.grid_views import CAMERA, HEIGHT, SIZE, WIDTH, photo, view
+from tests.decoding.grid_views import CAMERA, HEIGHT, SIZE, WIDTH, photo, view
 
 PERIOD = CodedGrid().period
 FALSE = 0.01

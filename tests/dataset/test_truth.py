@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.dataset.truth import truth_maps
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.endoscope import Endoscope
 from mitsuba_endo.geometry.laws import projector_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.capture.settings import Effects
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.learn.compose import Appearance, compose, crop_view
 from mitsuba_endo.learn.patterns import TEXELS, grid_texture
 from mitsuba_endo.learn.textures import clouds, without_pattern

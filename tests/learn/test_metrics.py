@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.network import CHANNELS, read_heads
+from mitsuba_endo.decoding.network import CHANNELS, read_heads
 from mitsuba_endo.learn.compose import Targets
 from mitsuba_endo.learn.metrics import phase_error, pixel_metrics
 

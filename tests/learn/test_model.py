@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
-from mitsuba_endo.decode.network import CHANNELS, load_network  # noqa: E402
+from mitsuba_endo.decoding.network import CHANNELS, load_network  # noqa: E402
 from mitsuba_endo.learn.export import export_onnx  # noqa: E402
 from mitsuba_endo.learn.model import DecoderNet  # noqa: E402
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 
 HEIGHT, WIDTH = 150, 200

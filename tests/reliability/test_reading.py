@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.image_files import read_image
+from mitsuba_endo.decoding.image_files import read_image
 from mitsuba_endo.errors import InputError, shown
 from mitsuba_endo.reading.file_storage import read_file_storage
 from mitsuba_endo.reading.regular import IMAGE, MAP, SizeLimit, is_file, read_bytes, regular

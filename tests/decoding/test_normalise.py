@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
-from mitsuba_endo.decode.normalise import normalise, one_channel
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.normalise import normalise, one_channel
 from mitsuba_endo.errors import InputError
 
 GRID = CodedGrid(width=150, height=101, columns=14, rows=9, period=10.0)

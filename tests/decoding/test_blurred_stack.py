@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_endo.decode.coordinate_noise import with_measured_noise
-from mitsuba_endo.decode.plan import StackPlan
-from mitsuba_endo.decode.stack import DecodedStack, Stack, decode_stack
-from mitsuba_endo.decode.stack_patterns import patterns
-from tests.decode.captures import SIZE, View, inner, photograph, view
+from mitsuba_endo.decoding.coordinate_noise import with_measured_noise
+from mitsuba_endo.decoding.plan import StackPlan
+from mitsuba_endo.decoding.stack import DecodedStack, Stack, decode_stack
+from mitsuba_endo.decoding.stack_patterns import patterns
+from tests.decoding.captures import SIZE, View, inner, photograph, view
 
 PLAN = StackPlan.make("gray", *SIZE, inverse=True)
 BLUR = 3.0

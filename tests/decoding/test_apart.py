@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode import apart
-from mitsuba_endo.decode.apart import ApartNetwork
-from mitsuba_endo.decode.network import describe, load_network
+from mitsuba_endo.decoding import apart
+from mitsuba_endo.decoding.apart import ApartNetwork
+from mitsuba_endo.decoding.network import describe, load_network
 from mitsuba_endo.errors import InputError
 
-WEIGHTS = (files("mitsuba_endo.decode") / "weights" / "decoder.onnx").read_bytes()
+WEIGHTS = (files("mitsuba_endo.decoding") / "weights" / "decoder.onnx").read_bytes()
 UNKNOWN_FIELD = b"\xc2\x3e\x01x"
 """A field of 1000 of no meaning: the same network, another checksum."""
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_endo.decode.grid.decode import DecodedGrid, decode_heads
-from mitsuba_endo.decode.grid_pattern import CodedGrid
-from mitsuba_endo.decode.network import CHANNELS, read_heads
+from mitsuba_endo.decoding.grid.decode import DecodedGrid, decode_heads
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.network import CHANNELS, read_heads
 from mitsuba_endo.errors import InputError
-from tests.decode.grid_views import HEIGHT, WIDTH, view
-from tests.decode.heads import Errors, depth_edges, network_output
+from tests.decoding.grid_views import HEIGHT, WIDTH, view
+from tests.decoding.heads import Errors, depth_edges, network_output
 
 PATTERN = CodedGrid()
 FALSE = 0.01

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-import mitsuba_endo.decode.grid
-from mitsuba_endo.decode.grid.decode import DEFAULTS, decode_heads
-from mitsuba_endo.decode.grid.settings import MatcherSettings
-from mitsuba_endo.decode.grid_pattern import CodedGrid
-from mitsuba_endo.decode.network import CHANNELS, read_heads
-from tests.decode.grid_views import view
-from tests.decode.heads import Errors, network_output
+import mitsuba_endo.decoding.grid
+from mitsuba_endo.decoding.grid.decode import DEFAULTS, decode_heads
+from mitsuba_endo.decoding.grid.settings import MatcherSettings
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.network import CHANNELS, read_heads
+from tests.decoding.grid_views import view
+from tests.decoding.heads import Errors, network_output
 
-ROOM = Path(mitsuba_endo.decode.grid.__file__).parent
+ROOM = Path(mitsuba_endo.decoding.grid.__file__).parent
 NAMES = [field.name for field in fields(MatcherSettings)]
 SOURCES = ("By hand", "Geometry", "Chance", "Study")
 

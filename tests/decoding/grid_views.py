@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform

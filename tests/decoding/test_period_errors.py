@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.gap_code import gap_code
-from mitsuba_endo.decode.grid.code_matching import CodeMatcher
-from mitsuba_endo.decode.grid.decode import DEFAULTS
-from mitsuba_endo.decode.grid.grid_graph import GridGraph, GridLinks, GridNodes, graph_of
-from mitsuba_endo.decode.grid.node_assignment import NodeAssignment, reject_period_errors
+from mitsuba_endo.decoding.gap_code import gap_code
+from mitsuba_endo.decoding.grid.code_matching import CodeMatcher
+from mitsuba_endo.decoding.grid.decode import DEFAULTS
+from mitsuba_endo.decoding.grid.grid_graph import GridGraph, GridLinks, GridNodes, graph_of
+from mitsuba_endo.decoding.grid.node_assignment import NodeAssignment, reject_period_errors
 
 PATTERN = gap_code(20, 18)
 COLUMNS, ROWS = 9, 8

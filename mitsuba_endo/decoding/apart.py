@@ -161,6 +161,6 @@ def serve(load: Load) -> None:
 
 
 if __name__ == "__main__":
-    from mitsuba_endo.decode.network import loader
+    from mitsuba_endo.decoding.network import loader
 
     serve(loader(sys.argv[1]))

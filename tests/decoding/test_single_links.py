@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mitsuba_endo.decode.gap_code import gap_code
-from mitsuba_endo.decode.grid.code_matching import CodeMatcher
-from mitsuba_endo.decode.grid.decode import DEFAULTS, DecodedGrid
-from mitsuba_endo.decode.grid.grid_graph import GridGraph, GridLinks, GridNodes
-from mitsuba_endo.decode.grid.node_assignment import NodeAssignment, assign_by_single_links
+from mitsuba_endo.decoding.gap_code import gap_code
+from mitsuba_endo.decoding.grid.code_matching import CodeMatcher
+from mitsuba_endo.decoding.grid.decode import DEFAULTS, DecodedGrid
+from mitsuba_endo.decoding.grid.grid_graph import GridGraph, GridLinks, GridNodes
+from mitsuba_endo.decoding.grid.node_assignment import NodeAssignment, assign_by_single_links
 
 PATTERN = gap_code(12, 10)
 TRUE = np.array([[4, 5], [5, 5], [4, 6], [5, 6], [6, 6], [7, 6], [4, 7]])

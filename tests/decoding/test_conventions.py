@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.conventions import (
+from mitsuba_endo.decoding.conventions import (
     INVERSES,
     NOTHING,
     WORDS,
@@ -18,14 +18,14 @@ from mitsuba_endo.decode.conventions import (
     own_convention,
     read_convention,
 )
-from mitsuba_endo.decode.gray_code import Code
-from mitsuba_endo.decode.phase_shift import PhaseConvention
-from mitsuba_endo.decode.plan import STEPS, STRIPES, StackPlan, possible_plans
-from mitsuba_endo.decode.stack import Stack, decode_stack
-from mitsuba_endo.decode.stack_patterns import patterns
-from mitsuba_endo.decode.stack_reading import StackReading, StackRequest, find_reading
+from mitsuba_endo.decoding.gray_code import Code
+from mitsuba_endo.decoding.phase_shift import PhaseConvention
+from mitsuba_endo.decoding.plan import STEPS, STRIPES, StackPlan, possible_plans
+from mitsuba_endo.decoding.stack import Stack, decode_stack
+from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_reading import StackReading, StackRequest, find_reading
 from mitsuba_endo.errors import InputError, NothingDecodedError
-from tests.decode.captures import SIZE, View, inner, photograph, view
+from tests.decoding.captures import SIZE, View, inner, photograph, view
 
 COSINE, SINE = PhaseConvention(1, 0), PhaseConvention(1, 0.75)
 BACKWARD, FROM_STEP_ONE = PhaseConvention(-1, 0), PhaseConvention(1, 0.25)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.network import CHANNELS, Network, load_network
+from mitsuba_endo.decoding.network import CHANNELS, Network, load_network
 from mitsuba_endo.errors import InputError
-from tests.decode.grid_views import photo, view
+from tests.decoding.grid_views import photo, view
 
-SHIPPED = Path(str(files("mitsuba_endo.decode"))) / "weights" / "decoder.onnx"
+SHIPPED = Path(str(files("mitsuba_endo.decoding"))) / "weights" / "decoder.onnx"
 WEIGHTS = SHIPPED.read_bytes()
 
 

@@ -140,7 +140,7 @@ def load_network(path: str | Path | None = None, engine: Engine | None = None) -
         InputError: no such file, no description beside it, or weights that it does not describe.
     """
     if path is None:
-        with as_file(files("mitsuba_endo.decode") / "weights") as folder:
+        with as_file(files("mitsuba_endo.decoding") / "weights") as folder:
             return load_network(folder / "decoder.onnx", engine)
     path = Path(path)
     weights = read_bytes(path, NETWORK, todo="give the decoder's ONNX file")
@@ -183,7 +183,7 @@ def loader(engine: str) -> Callable[[bytes], _Runner]:
 
 
 def _shipped() -> bytes:
-    return (files("mitsuba_endo.decode") / "weights" / "decoder.onnx").read_bytes()
+    return (files("mitsuba_endo.decoding") / "weights" / "decoder.onnx").read_bytes()
 
 
 def _onnxruntime(weights: bytes) -> _Runner:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.rendering.pattern import make_pattern
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.gray_code import bit_images, read_stripes
-from mitsuba_endo.decode.phase_shift import phase_images, wrapped_coordinate
-from mitsuba_endo.decode.plan import StackPlan
-from mitsuba_endo.decode.stack import decode_stack
-from mitsuba_endo.decode.stack_images import Stack, estimate_noise
-from mitsuba_endo.decode.stack_patterns import patterns
+from mitsuba_endo.decoding.gray_code import bit_images, read_stripes
+from mitsuba_endo.decoding.phase_shift import phase_images, wrapped_coordinate
+from mitsuba_endo.decoding.plan import StackPlan
+from mitsuba_endo.decoding.stack import decode_stack
+from mitsuba_endo.decoding.stack_images import Stack, estimate_noise
+from mitsuba_endo.decoding.stack_patterns import patterns
 from mitsuba_endo.errors import InputError, NothingDecodedError
 from mitsuba_endo.start.search import search_start
-from tests.decode.captures import SIZE, View, inner, photograph, view
+from tests.decoding.captures import SIZE, View, inner, photograph, view
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,6 @@ def test_class_names_have_one_meaning():
     shared = {
         name: sorted(map(str, paths))
         for name, paths in homes.items()
-        if len(paths) > 1 and any(path.parts[0] == "decode" for path in paths)
+        if len(paths) > 1 and any(path.parts[0] == "decoding" for path in paths)
     }
     assert not shared

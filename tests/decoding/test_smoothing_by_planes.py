@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.grid.decode import DEFAULTS
-from mitsuba_endo.decode.grid.phase_unwrapping import smoothed_by_planes
+from mitsuba_endo.decoding.grid.decode import DEFAULTS
+from mitsuba_endo.decoding.grid.phase_unwrapping import smoothed_by_planes
 
 NOISE = 0.04
 """Periods."""

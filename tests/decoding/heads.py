@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from mitsuba_endo.decode.grid_pattern import CodedGrid
-from mitsuba_endo.decode.network import CHANNELS
+from mitsuba_endo.decoding.grid_pattern import CodedGrid
+from mitsuba_endo.decoding.network import CHANNELS
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.gap_code import gap_code, letters, window_distance
+from mitsuba_endo.decoding.gap_code import gap_code, letters, window_distance
 from mitsuba_endo.errors import InputError
 
 

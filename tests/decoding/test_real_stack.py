@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from mitsuba_endo.decode.plan import StackPlan
-from mitsuba_endo.decode.stack_patterns import patterns
+from mitsuba_endo.decoding.plan import StackPlan
+from mitsuba_endo.decoding.stack_patterns import patterns
 from mitsuba_endo.records.correspondence import load_map
 from tests.cli.inputs import run
 
@@ -74,9 +74,9 @@ def test_rows_first(tmp_path: Path):
 MEASURED = """
 import json, resource, sys
 from pathlib import Path
-from mitsuba_endo.decode.stack import decode_stack
-from mitsuba_endo.decode.stack_files import StackFiles, stack_paths
-from mitsuba_endo.decode.stack_reading import StackRequest, find_reading
+from mitsuba_endo.decoding.stack import decode_stack
+from mitsuba_endo.decoding.stack_files import StackFiles, stack_paths
+from mitsuba_endo.decoding.stack_reading import StackRequest, find_reading
 stack = StackFiles(stack_paths([sys.argv[1]]))
 reading = find_reading(stack, StackRequest(width=1024, height=768, kind="gray"))
 decoded = decode_stack(stack, reading.plan, order=reading.order)
@@ -114,10 +114,10 @@ def test_memory_of_42_photographs_of_16_megapixels(tmp_path: Path):
 
 def test_strips_and_reading_again_change_nothing(tmp_path: Path, monkeypatch):
     """Oracle: the same stack in memory and in one strip."""
-    from mitsuba_endo.decode import strips
-    from mitsuba_endo.decode.stack import decode_stack
-    from mitsuba_endo.decode.stack_files import StackFiles, stack_paths
-    from mitsuba_endo.decode.stack_reading import StackRequest, find_reading
+    from mitsuba_endo.decoding import strips
+    from mitsuba_endo.decoding.stack import decode_stack
+    from mitsuba_endo.decoding.stack_files import StackFiles, stack_paths
+    from mitsuba_endo.decoding.stack_reading import StackRequest, find_reading
 
     _write(tmp_path / "stack", 300, 210)
     paths = stack_paths([tmp_path / "stack"])

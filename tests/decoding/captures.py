@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from mitsuba_endo.decode.stack import Stack
+from mitsuba_endo.decoding.stack import Stack
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
