@@ -59,6 +59,21 @@ def ensure() -> str:
     return (mi.variant() if mi else None) or use()
 
 
+def ensure_derivatives() -> str:
+    """Return the active variant if it has derivatives, starting Mitsuba if none is active.
+
+    Raises:
+        InputError: another variant is active: what was made under it would be lost by a switch.
+    """
+    variant = ensure()
+    if variant not in VARIANTS:
+        raise InputError(
+            f"has the variant {variant} active, which the solver cannot use", "Mitsuba",
+            "call mitsuba_endo.backend.use() first",
+        )  # fmt: skip
+    return variant
+
+
 def locate_llvm() -> Path | None:
     """Set ``DRJIT_LIBLLVM_PATH`` to the LLVM library of the installed wheel; return its path.
 

@@ -193,16 +193,15 @@ def with_sharing(rig: "Rig", text: str) -> "Rig":
         InputError: not of the form block=mode, or an unknown block or mode.
     """
     from ..errors import InputError
-    from ..records.rig import Share
-    from ..records.validation import validate
+    from ..records.plan import with_plan
 
-    plan = rig.share.model_dump()
+    plan = {}
     for item in text.split(","):
         block, equals, mode = (part.strip() for part in item.partition("="))
         if not equals:
             raise InputError(f"'{item}' is not block=mode", "--share", "e.g. surface=per_frame")
         plan[block] = mode
-    return rig.model_copy(update={"share": validate(Share, plan, "--share")})
+    return with_plan(rig, plan, "--share")
 
 
 def solve_and_write(

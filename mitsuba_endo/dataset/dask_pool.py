@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .work import DatasetJob, Result, prepare, produce
+from .work import DatasetJob, SampleOutcome, prepare, produce
 
 AHEAD = 2
 """Samples handed out per worker: one being made and one waiting."""
@@ -20,7 +20,7 @@ class DaskPool:
         self._job, self._client = job, _connect(address)
         self._workers = self._check(address)
 
-    def run(self, indices: Iterable[int]) -> Iterator[Result]:
+    def run(self, indices: Iterable[int]) -> Iterator[SampleOutcome]:
         """Yield a result for every number, in the order of completion."""
         from dask.distributed import as_completed  # pyright: ignore[reportMissingImports]
 
@@ -86,7 +86,7 @@ def _connect(address: str) -> Any:
         ) from None
 
 
-def _produce(job: DatasetJob, index: int) -> Result:
+def _produce(job: DatasetJob, index: int) -> SampleOutcome:
     """Make a sample on a worker, which stays prepared from its first sample on."""
     import sys
 
@@ -95,9 +95,9 @@ def _produce(job: DatasetJob, index: int) -> Result:
     return produce(job, index)
 
 
-def _result(future: Any, index: int) -> Result:
+def _result(future: Any, index: int) -> SampleOutcome:
     """Return what the worker returned, or that it died (Dask itself has tried it elsewhere)."""
     error = future.exception()
     if error is None:
         return future.result()
-    return Result(index, "killed", f"its worker was lost ({type(error).__name__}: {error}).")
+    return SampleOutcome(index, "killed", f"its worker was lost ({type(error).__name__}: {error}).")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..interrupts import uninterrupted
-from .work import DatasetJob, Result, prepare, produce
+from .work import DatasetJob, SampleOutcome, prepare, produce
 
 RETRIES = 1
 """Times a sample is tried again whose worker was killed."""
@@ -46,7 +46,7 @@ class LocalPool:
         job: DatasetJob,
         workers: int,
         prepare: Callable[[], None] = prepare,
-        produce: Callable[[DatasetJob, int], Result] = produce,
+        produce: Callable[[DatasetJob, int], SampleOutcome] = produce,
         recycle: int = RECYCLE,
     ) -> None:
         """Describe the workers; they start when there is work.
@@ -63,7 +63,7 @@ class LocalPool:
         self._context = multiprocessing.get_context("spawn")
         self._workers: list[_Worker] = []
 
-    def run(self, indices: Iterable[int]) -> Iterator[Result]:
+    def run(self, indices: Iterable[int]) -> Iterator[SampleOutcome]:
         """Yield a result for every number, in the order of completion.
 
         All processes are gone when the iteration ends, also by an exception.
@@ -91,7 +91,7 @@ class LocalPool:
     def _busy(self) -> int:
         return sum(worker.index is not None for worker in self._workers)
 
-    def _collect(self, waiting: deque[int], deaths: dict[int, int]) -> Iterator[Result]:
+    def _collect(self, waiting: deque[int], deaths: dict[int, int]) -> Iterator[SampleOutcome]:
         """Wait until a worker reports or dies."""
         handles = {worker.connection: worker for worker in self._workers}
         for ready in multiprocessing.connection.wait(list(handles)):
@@ -109,7 +109,9 @@ class LocalPool:
                 self._dismiss(worker)
             yield result
 
-    def _bury(self, worker: _Worker, waiting: deque[int], deaths: dict[int, int]) -> Result | None:
+    def _bury(
+        self, worker: _Worker, waiting: deque[int], deaths: dict[int, int]
+    ) -> SampleOutcome | None:
         """Forget a dead worker; its sample goes to the front of the queue or is given up."""
         self._workers.remove(worker)
         worker.process.join()
@@ -124,7 +126,7 @@ class LocalPool:
         code = worker.process.exitcode
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         reason = f"its worker was killed {deaths[index]} times ({how}); is there enough memory?"
-        return Result(index, "killed", reason)
+        return SampleOutcome(index, "killed", reason)
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
@@ -166,7 +168,7 @@ def _serve(
     connection: Any,
     job: DatasetJob,
     prepare: Callable[[], None],
-    produce: Callable[[DatasetJob, int], Result],
+    produce: Callable[[DatasetJob, int], SampleOutcome],
 ) -> None:
     """Make the samples whose numbers come in, until the other end closes."""
     # Ctrl-C reaches the whole group; the parent decides.

@@ -20,7 +20,7 @@ from .config import Config
 from .contents import Store, numbered
 from .digests import array_digest
 from .scene_ranges import FILE
-from .work import DatasetJob, Result
+from .work import DatasetJob, SampleOutcome
 
 SCHEMA = 1
 """Of dataset.json and manifest.json; changes whenever the meaning of a key does."""
@@ -34,7 +34,7 @@ Advance = Callable[["Progress"], None]
 class Pool(Protocol):
     """Somebody who makes samples."""
 
-    def run(self, indices: Iterable[int]) -> Iterator[Result]:
+    def run(self, indices: Iterable[int]) -> Iterator[SampleOutcome]:
         """Yield a result for every number, in the order of completion."""
         ...
 
@@ -166,7 +166,7 @@ def _make_missing(
     return progress
 
 
-def _record_failure(job: DatasetJob, result: Result) -> None:
+def _record_failure(job: DatasetJob, result: SampleOutcome) -> None:
     record = {"index": result.index, "seed": job.config.seed, "status": result.status,
               "reason": result.reason}  # fmt: skip
     _write_json(_failure(job.out, result.index), record)

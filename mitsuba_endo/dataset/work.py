@@ -42,7 +42,7 @@ class DatasetJob:
 
 
 @dataclass(frozen=True)
-class Result:
+class SampleOutcome:
     """How the work on one sample ended."""
 
     index: int
@@ -68,7 +68,7 @@ def prepare() -> None:
     cv2.setNumThreads(1)
 
 
-def produce(job: DatasetJob, index: int) -> Result:
+def produce(job: DatasetJob, index: int) -> SampleOutcome:
     """Make a sample and store it; whatever goes wrong with it becomes part of the result."""
     started = time.perf_counter()
     store = job.config.store
@@ -77,14 +77,14 @@ def produce(job: DatasetJob, index: int) -> Result:
         job.store().write(sample, store.radiance, store.surface)
     except InputError as error:
         status = "stop" if isinstance(error.__cause__, OSError) else "failed"
-        return Result(index, status, str(error), time.perf_counter() - started)
+        return SampleOutcome(index, status, str(error), time.perf_counter() - started)
     except OSError as error:
         status = "stop" if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else "failed"
-        return Result(index, status, f"{error}.", time.perf_counter() - started)
+        return SampleOutcome(index, status, f"{error}.", time.perf_counter() - started)
     except Exception as error:  # one sample's fault, recorded with its seed, must not end the run
         reason = f"internal fault ({type(error).__name__}: {error})."
-        return Result(index, "failed", reason, time.perf_counter() - started)
-    return Result(index, "done", "", time.perf_counter() - started, sample.kind)
+        return SampleOutcome(index, "failed", reason, time.perf_counter() - started)
+    return SampleOutcome(index, "done", "", time.perf_counter() - started, sample.kind)
 
 
 @lru_cache(maxsize=1)

@@ -19,6 +19,7 @@ Matrix3 = Annotated[
     list[Annotated[list[float], Field(min_length=3, max_length=3)]],
     Field(min_length=3, max_length=3),
 ]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
@@ -68,6 +69,8 @@ class PoseEstimate(Record):
     """Six values: rotation vector (radians), translation (the solution's unit)."""
     std_formal: list[float] | None = None
     std_jackknife: list[float] | None = None
+    covariance: Annotated[list[Six], Field(min_length=6, max_length=6)] | None = None
+    """(6, 6), of which ``std`` is the diagonal's root; None where the pose is no unknown."""
     status: Status = "measured"
     reason: str | None = None
 

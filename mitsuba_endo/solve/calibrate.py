@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from .. import backend
 from ..geometry.laws import LAWS
 from ..records.calibration import Calibration
 from ..records.checkpoint import Checkpoint
@@ -32,7 +33,7 @@ def calibrate(
     resume: Checkpoint | None = None,
     observe: Observe | None = None,
 ) -> Calibration:
-    """Calibrate a projector from correspondence maps.
+    """Calibrate a projector from correspondence maps; starts Mitsuba if nobody has.
 
     Args:
         maps: one for each frame.
@@ -52,6 +53,7 @@ def calibrate(
     say = progress or (lambda _share, _step: None)
     minimiser_of(options)  # an unknown one is told before any work
     examined = examine(as_maps(maps), rig)
+    backend.ensure_derivatives()
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"), examined.told_on_failure():

@@ -8,7 +8,7 @@ from typing import Any
 from mitsuba_endo import backend
 from mitsuba_endo.dataset.config import Config
 from mitsuba_endo.dataset.run import Progress, make_dataset
-from mitsuba_endo.dataset.work import DatasetJob, Result, produce
+from mitsuba_endo.dataset.work import DatasetJob, SampleOutcome, produce
 from mitsuba_endo.records.validation import validate
 
 SHEET = {
@@ -39,11 +39,11 @@ class InThisProcess:
     """A pool without processes."""
 
     def __init__(
-        self, job: DatasetJob, produce: Callable[[DatasetJob, int], Result] = produce
+        self, job: DatasetJob, produce: Callable[[DatasetJob, int], SampleOutcome] = produce
     ) -> None:
         self._job, self._produce = job, produce
 
-    def run(self, indices: Iterable[int]) -> Iterator[Result]:
+    def run(self, indices: Iterable[int]) -> Iterator[SampleOutcome]:
         backend.ensure()
         for index in indices:
             with one_thread():

@@ -14,7 +14,7 @@ from mitsuba_endo.dataset.digests import file_digest
 from mitsuba_endo.dataset.reader import Dataset
 from mitsuba_endo.dataset.run import failures, locked, make_dataset
 from mitsuba_endo.dataset.sample import make_sample
-from mitsuba_endo.dataset.work import Result, produce
+from mitsuba_endo.dataset.work import SampleOutcome, produce
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.litter import aside_of
 from tests.dataset.small import (
@@ -139,7 +139,7 @@ def test_a_failed_sample_is_recorded_and_the_others_are_made(tmp_path: Path):
     config, out = small_config(format="hdf5", shard=3), tmp_path / "out"
 
     def failing(job, index):
-        return Result(index, "failed", "no luck.") if index == 1 else produce(job, index)
+        return SampleOutcome(index, "failed", "no luck.") if index == 1 else produce(job, index)
 
     done = make_dataset(config, out, 3, lambda job: InThisProcess(job, failing))
     assert (done.done, done.failed) == (2, 1)

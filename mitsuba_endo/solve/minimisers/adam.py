@@ -69,7 +69,7 @@ class Moments:
 
 
 @dataclass(frozen=True, eq=False)
-class Iterate:
+class AdamIterate:
     """Where the optimisation stands."""
 
     at: Evaluation
@@ -100,12 +100,12 @@ class Adam:
     ) -> OptimisationResult:
         return iterate(self.init(problem, state, noise), self.step, on_iteration)
 
-    def init(self, problem: Problem, state: State, noise: NoiseScale) -> Iterate:
+    def init(self, problem: Problem, state: State, noise: NoiseScale) -> AdamIterate:
         """Evaluate the starting state."""
         at = evaluate(problem, state)
         return _new_stage(at, noise.at(at.noise()))
 
-    def step(self, now: Iterate) -> Iterate:
+    def step(self, now: AdamIterate) -> AdamIterate:
         """Return what one more window of iterations leads to."""
         if len(now.trace) * _WINDOW >= self.max_iterations:
             return replace(now, outcome=Outcome.MAX_ITERATIONS)
@@ -129,7 +129,7 @@ def adam(options: Options) -> Adam:
     return Adam(options.adam_iterations)
 
 
-def _descend(now: Iterate) -> tuple[State, Moments]:
+def _descend(now: AdamIterate) -> tuple[State, Moments]:
     """Make the iterations of one window, with steps in units of the learning rates."""
     problem, state, moments = now.at.problem, now.at.state, now.moments
     ends = np.cumsum([s.size for s in problem.surfaces])
@@ -141,16 +141,16 @@ def _descend(now: Iterate) -> tuple[State, Moments]:
     return state, moments
 
 
-def _next_stage(now: Iterate) -> Iterate:
+def _next_stage(now: AdamIterate) -> AdamIterate:
     """Return the beginning of the last stage, or the end."""
     if now.noise.last:
         return replace(now, outcome=Outcome.CONVERGED)
     return replace(_new_stage(now.at, now.noise.final(now.at.noise())), trace=now.trace)
 
 
-def _new_stage(at: Evaluation, noise: NoiseScale) -> Iterate:
+def _new_stage(at: Evaluation, noise: NoiseScale) -> AdamIterate:
     rates = learning_rates(at.problem, at.state)
-    return Iterate(at, noise, rates, Moments.none(len(rates)))
+    return AdamIterate(at, noise, rates, Moments.none(len(rates)))
 
 
 def learning_rates(problem: Problem, state: State) -> Floats:

@@ -134,9 +134,11 @@ class Estimates:
         known = self.fit.uncertainty
         jackknives = [c for c in (known.jackknife, known.frame_jackknife) if c is not None]
         candidates = [self._pose_std(name, frame, own, c) for c in jackknives]
+        covariance = self._pose_covariance(name, frame, own, self.covariance)
         return PoseEstimate.of(
             pose,
-            std=self._pose_std(name, frame, own, self.covariance),
+            std=_deviations(covariance),
+            covariance=covariance.tolist(),
             std_formal=self._pose_std(name, frame, own, known.formal),
             std_jackknife=[float(x) for x in np.max(candidates, axis=0)] if candidates else None,
             status=status,
@@ -180,13 +182,17 @@ class Estimates:
     def _pose_std(
         self, name: str, frame: int, own: RigidTransform, covariance: Floats
     ) -> list[float]:
-        """Return six deviations; the unit's own uncertainty adds to the translation's."""
+        return _deviations(self._pose_covariance(name, frame, own, covariance))
+
+    def _pose_covariance(
+        self, name: str, frame: int, own: RigidTransform, covariance: Floats
+    ) -> Floats:
+        """Return (6, 6), radians and the solution's unit, whose own error moves translations."""
         state, layout = self.fit.state, self.layout
         T = layout.local_from_global(state, frame)[layout.rows(name, frame)]
-        variance = np.maximum(np.diag(T @ covariance @ T.T), 0.0).copy()
-        variance[3:] += (own.t * self.unit.std_relative) ** 2
-        variance[3:] *= self.unit.factor**2
-        return [float(x) for x in np.sqrt(variance)]
+        shared = np.concatenate([np.zeros(3), own.t * self.unit.std_relative])
+        lengths = np.repeat([1.0, self.unit.factor], 3)
+        return (T @ covariance @ T.T + np.outer(shared, shared)) * np.outer(lengths, lengths)
 
 
 def jackknife_variances(fit: Fit) -> list[Floats]:
@@ -201,6 +207,10 @@ def inflation(fit: Fit) -> float:
     ratios = [np.median(v / formal) for v in jackknife_variances(fit) if len(v)]
     effect = 1.0 if fit.model is None else fit.model.effect
     return float(np.sqrt(max([1.0, effect, *ratios])))
+
+
+def _deviations(covariance: Floats) -> list[float]:
+    return [float(x) for x in np.sqrt(np.maximum(np.diag(covariance), 0.0))]
 
 
 def listed(items: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from .block import Floats, LogarithmBlock, register_block
 
 
 @register_block
-class Focal(LogarithmBlock):
+class ProjectorFocal(LogarithmBlock):
     """(log f), f in pattern pixels."""
 
     name: ClassVar[str] = "focal"

@@ -1,0 +1,158 @@
+"""What callers bring, paths, arrays or records, as maps and a rig."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..decoding.grid.decode import decode_image
+from ..decoding.image_files import ImageFrame, full_scale, is_images, read_frames
+from ..decoding.network import load_network
+from ..decoding.pattern_option import coded_grid
+from ..errors import InputError, NothingDecodedError, shown
+from ..records.correspondence import CorrespondenceMap, load_map
+from ..records.rig import Rig, load_rig
+from ..records.validation import validate
+from ..refine.decoded import DecodedMap, decoded_map
+
+Array: TypeAlias = NDArray[Any]
+FrameInput: TypeAlias = str | Path | Array | CorrespondenceMap
+"""A frame: a file of a map or an image, a folder or video of images, a map (H, W, 2), or a map's
+record."""
+RigInput: TypeAlias = str | Path | Mapping[str, Any] | Rig
+"""A rig: its file, its contents as they would stand in the file, or its record."""
+DEFAULT_PATTERN = "pattern:coded"
+
+
+def as_rig(rig: RigInput) -> Rig:
+    """Return a rig's record.
+
+    Raises:
+        InputError: a file or contents that cannot be used, or something else.
+    """
+    if isinstance(rig, Rig):
+        return rig
+    if isinstance(rig, str | Path):
+        return load_rig(rig)
+    if isinstance(rig, Mapping):
+        return validate(Rig, dict(rig), "rig")
+    raise InputError(f"is {shown(type(rig).__name__)} and no rig", "rig", "give rig.yaml's path")
+
+
+def as_frames(captures: FrameInput | Iterable[FrameInput]) -> list[FrameInput]:
+    """Return the frames of a capture or of several."""
+    if isinstance(captures, str | Path | CorrespondenceMap | np.ndarray):
+        return [captures]
+    if not isinstance(captures, Iterable):
+        what = f"is {shown(type(captures).__name__)} and no capture"
+        raise InputError(what, "captures", "give paths, arrays or maps")
+    return list(captures)
+
+
+def as_correspondences(
+    captures: Iterable[FrameInput], rig: Rig, pattern: str | None, refine: bool
+) -> list[CorrespondenceMap]:
+    """Return the maps of frames; images are decoded.
+
+    Args:
+        captures: of every frame.
+        rig: sizes of image and pattern.
+        pattern: in the images, a command's ``--pattern``; None: the coded grid.
+        refine: whether decoded coordinates are refined on their images.
+
+    Raises:
+        InputError: a frame that cannot be read or is of another kind, or a pattern where there
+            are no images.
+        NothingDecodedError: no pattern in any image.
+    """
+    maps: list[CorrespondenceMap] = []
+    images: list[Path] = []
+    for k, capture in enumerate(captures):
+        if isinstance(capture, CorrespondenceMap):
+            maps.append(capture)
+        elif isinstance(capture, np.ndarray):
+            maps.append(_map_of(capture, k))
+        elif not isinstance(capture, str | Path):
+            what = f"is {shown(type(capture).__name__)} and no capture"
+            raise InputError(what, f"captures[{k}]", "give a path, an array (H, W, 2) or a map")
+        elif is_images(Path(capture)):
+            images.append(Path(capture))
+        else:
+            maps.append(load_map(capture))
+    if images and maps:
+        raise InputError("maps and images are given", str(images[0]), "give one kind")
+    if not images and pattern is not None:
+        raise InputError("is for images, and maps are given", "pattern", "leave it out")
+    return _decoded(images, rig, pattern, refine) if images else maps
+
+
+def decode_frame(frame: ImageFrame, rig: Rig, pattern: str | None, refine: bool) -> DecodedMap:
+    """Return the map of an image of the coded grid.
+
+    Raises:
+        InputError: an image of another size than the rig's, or an unknown pattern.
+        NothingDecodedError: the image does not show the pattern.
+    """
+    height, width = frame.image.shape[:2]
+    if (width, height) != (rig.camera.width, rig.camera.height):
+        raise InputError(
+            f"is {width} x {height} pixels and the rig's camera.width x camera.height "
+            f"{rig.camera.width} x {rig.camera.height}",
+            frame.source, "give the rig of the camera that took it",
+        )  # fmt: skip
+    grid = coded_grid(pattern or DEFAULT_PATTERN, rig.projector.width, rig.projector.height)
+    decoded = decode_image(frame.image, load_network(None), grid)
+    if decoded.reason:
+        raise NothingDecodedError(decoded.reason, frame.name, "check the pattern, light and focus")
+    return decoded_map(frame.image, decoded, grid, frame.name, refine=refine)
+
+
+def as_image(image: str | Path | Array) -> ImageFrame:
+    """Return an image that is a file or an array (H, W) or (H, W, 3) of integers or of 0 to 1.
+
+    Raises:
+        InputError: a file that cannot be read or holds several images, or another array.
+    """
+    if isinstance(image, str | Path):
+        frames = read_frames([Path(image)])
+        first = next(frames)
+        if next(frames, None) is not None:
+            raise InputError("holds several images", str(image), "decode them one by one")
+        return first
+    array = np.asarray(image)
+    whole = array.dtype in (np.uint8, np.uint16)
+    if array.ndim not in (2, 3) or not array.size or not (whole or array.dtype.kind == "f"):
+        what = f"is an array {array.shape} of {array.dtype}"
+        raise InputError(what, "image", "give (H, W) or (H, W, 3), 8 or 16 bits or 0 to 1")
+    scale = full_scale(array) if whole else 1.0
+    scaled = np.divide(array, scale, dtype=np.float32)
+    return ImageFrame("image", "image", scaled if scaled.ndim == 3 else scaled[..., None])
+
+
+def _decoded(
+    images: list[Path], rig: Rig, pattern: str | None, refine: bool
+) -> list[CorrespondenceMap]:
+    """Return the maps of the images that show the pattern.
+
+    Raises:
+        NothingDecodedError: none does; says why for the first.
+    """
+    maps: list[CorrespondenceMap] = []
+    failure: NothingDecodedError | None = None
+    for frame in read_frames(images):
+        try:
+            maps.append(decode_frame(frame, rig, pattern, refine).map)
+        except NothingDecodedError as error:
+            failure = failure or error
+    if not maps and failure is not None:
+        raise failure
+    return maps
+
+
+def _map_of(array: Array, index: int) -> CorrespondenceMap:
+    if array.ndim != 3 or array.shape[2] != 2 or array.dtype.kind not in "uif":
+        what = f"is an array {array.shape} of {array.dtype}"
+        raise InputError(what, f"captures[{index}]", "give a map (H, W, 2) in pattern pixels")
+    return CorrespondenceMap(np.ascontiguousarray(array, np.float32), f"frame_{index}")
