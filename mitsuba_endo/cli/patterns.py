@@ -1,4 +1,4 @@
-"""``mitsuba-endo patterns``: the images to project for ``decode-stack``."""
+"""``mitsuba-endo patterns``: what to project for ``decode-stack`` and ``decode``."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +9,6 @@ from .console import Debug, Json, Quiet, session
 from .stack_options import (
     Height,
     Inverse,
-    Kind,
     Periods,
     Reference,
     Steps,
@@ -21,11 +20,15 @@ from .stack_options import (
 if TYPE_CHECKING:
     from ..decoding.plan import StackPlan
 
+Projected = Annotated[
+    str, typer.Option("--pattern", "--kind", help="gray, phase, gray+phase or coded.")
+]
+_CODED = ("coded", "pattern:coded")
 Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
 
 
 def patterns(
-    kind: Kind,
+    kind: Projected,
     width: Width,
     height: Height,
     out: Out,
@@ -38,17 +41,59 @@ def patterns(
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Write the images of a Gray-code or phase-shift stack, numbered in order, to be projected."""
+    """Write patterns to project: a Gray-code or phase-shift stack, or the coded grid.
+
+    A stack is images numbered in order. The coded grid, --pattern coded (or
+    pattern:coded?period=16&seed=3), is one pattern as coded.png, coded.tiff, coded.svg for a mask
+    maker, and coded.json with its code.
+    """
     with session(quiet, as_json, debug) as output:
         from ..decoding.stack_files import save_patterns
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
 
         prepare_folder(out, Kind.PATTERNS)
-        plan = make_plan(kind, width, height, inverse, reference, stripe, periods, steps)
-        names = save_patterns(out, plan)
-        output.print(f"{out}: {len(names)} images; decode pictures of them with", _command(plan))
-        output.summary({"folder": str(out), "images": names, "decode": _command(plan)})
+        if kind.partition("?")[0] in _CODED:
+            _no_stack(inverse, reference, stripe, periods, steps)
+            names, command = _coded(out, kind, width, height)
+        else:
+            plan = make_plan(kind, width, height, inverse, reference, stripe, periods, steps)
+            names, command = save_patterns(out, plan), _command(plan)
+        output.print(f"{out}: {len(names)} files; decode pictures of them with", command)
+        output.summary({"folder": str(out), "images": names, "decode": command})
+
+
+def _coded(out: Path, kind: str, width: int, height: int) -> tuple[list[str], str]:
+    """Write the coded grid; return the files and the command that decodes pictures of it."""
+    from ..decoding.grid_files import description, save_grid
+    from ..decoding.pattern_option import coded_grid
+
+    full = kind if kind.startswith("pattern:") else f"pattern:{kind}"
+    grid = coded_grid(full, width, height)
+    named = description(grid)["pattern"]
+    command = f"mitsuba-endo decode IMAGE --rig rig.yaml --pattern '{named}' --out maps"
+    return save_grid(out, grid), command
+
+
+def _no_stack(
+    inverse: bool,
+    reference: bool,
+    stripe: int | None,
+    periods: str | None,
+    steps: int | None,
+) -> None:
+    """Refuse options that only stacks of images have."""
+    from ..errors import InputError
+
+    given = {
+        "--inverse": inverse, "--no-reference": not reference, "--stripe": stripe is not None,
+        "--periods": periods is not None, "--steps": steps is not None,
+    }  # fmt: skip
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(
+                "is for stacks, and the coded grid is one image", option, "leave it out"
+            )
 
 
 def _command(plan: "StackPlan") -> str:
