@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, shown
-from ..evaluate.depth import RayCaster, range_image
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration, SurfaceEstimate
 from ..records.rig import Rig
-from ..records.solution import Frame, PoseEstimate, Solution
-from ..show.frame_poses import frame_poses
+from ..records.solution import PoseEstimate, Solution
+from ..show.frame_views import FrameViews
 from ..show.measure import Distance, distance, pick
 from ..show.solution_folder import write_solution_folder
 
@@ -51,7 +50,6 @@ class Result:
         """
         self.calibration = calibration
         self.rig = rig
-        self._casters: dict[int, RayCaster] = {}
 
     @property
     def solution(self) -> Solution:
@@ -89,8 +87,7 @@ class Result:
         Raises:
             InputError: there is no such frame.
         """
-        index = self._index(frame)
-        return self.calibration.own_surfaces.get(index, self.surface)
+        return self._views.surface_of(self._index(frame))
 
     def depth(self, frame: int | str = 0) -> Floats:
         """Return the depth (H, W) of a frame: z in its camera's frame; NaN = no surface there.
@@ -109,14 +106,7 @@ class Result:
         Raises:
             InputError: there is no such frame, or its camera pose could not be determined.
         """
-        index = self._index(frame)
-        camera, pose = self.calibration.camera, self._surface_from_camera(index)
-        rays = camera.grid_rays
-        if np.allclose(pose.matrix(), np.eye(4), atol=0):
-            return range_image(self._caster(index), camera)[..., None] * rays
-        along = pose.rotate(rays.reshape(-1, 3))
-        ranges = self._caster(index).range(pose.t, along).reshape(rays.shape[:2])
-        return ranges[..., None] * rays
+        return self._views.points(self._index(frame))
 
     def distance(self, a: Sequence[float], b: Sequence[float], frame: int | str = 0) -> Distance:
         """Return the distance of the surface points that two pixels (x, y) of a frame see.
@@ -128,7 +118,8 @@ class Result:
             InputError: a pixel sees no surface, or as :meth:`points`.
         """
         index = self._index(frame)
-        surface, pose = self.surface_of(index), self._surface_from_camera(index)
+        surface = self._views.surface_of(index)
+        pose = self._views.surface_from_camera(index)
         ends = []
         for name, pixel in (("a", a), ("b", b)):
             ray = pose.rotate(self.calibration.camera.rays(np.asarray(pixel, float)))
@@ -154,15 +145,20 @@ class Result:
             for frame in self.solution.frames
         ]
 
-    def save(self, folder: str | Path) -> None:
+    def save(self, folder: str | Path, extras: Sequence[str] = ()) -> None:
         """Write the solution folder that the command ``calibrate`` writes.
 
         A result that was loaded has no state from which to go on; it is left out.
 
+        Args:
+            folder: to write.
+            extras: further files: ``depth``, ``points`` and ``masks`` of every frame,
+                ``pictures``.
+
         Raises:
             InputError: the folder holds other files, or cannot be written.
         """
-        write_solution_folder(folder, self.calibration, self.rig)
+        write_solution_folder(folder, self.calibration, self.rig, extras=extras)
 
     def __repr__(self) -> str:
         count = len(self.names)
@@ -172,8 +168,8 @@ class Result:
         return self.solution._repr_html_()
 
     @cached_property
-    def _seen(self) -> list[RigidTransform | None]:
-        return [at.first_from_camera for at in frame_poses(self.solution)]
+    def _views(self) -> FrameViews:
+        return FrameViews(self.calibration)
 
     def _index(self, frame: int | str) -> int:
         names = self.names
@@ -185,29 +181,6 @@ class Result:
             f"there is no frame {shown(frame)}", "frame",
             f"give 0 to {len(names) - 1}, or a name such as {names[0]}",
         )  # fmt: skip
-
-    def _frame(self, index: int) -> Frame:
-        return self.solution.frames[index]
-
-    def _surface_from_camera(self, index: int) -> RigidTransform:
-        """Return where a frame's camera is in the frame of the surface that it sees."""
-        if index == 0 or index in self.calibration.own_surfaces:
-            return RigidTransform.identity()
-        pose = self._seen[index]
-        if pose is None:
-            reason = self._frame(index).world_from_camera.reason
-            raise InputError(
-                f"the camera pose of {self.names[index]} could not be determined", "frame",
-                reason or "choose another frame",
-            )  # fmt: skip
-        return pose
-
-    def _caster(self, index: int) -> RayCaster:
-        own = index if index in self.calibration.own_surfaces else 0
-        if own not in self._casters:
-            surface = self.surface_of(own)
-            self._casters[own] = RayCaster(surface.vertices, surface.faces)
-        return self._casters[own]
 
 
 def _covariance(pose: PoseEstimate) -> Floats | None:

@@ -1,6 +1,6 @@
 """``mitsuba-endo calibrate``: from correspondence maps to a solution folder."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -93,6 +93,15 @@ Live = Annotated[
     bool, typer.Option("--live", help="Watch the optimisation in a browser; Ctrl-C ends.")
 ]
 
+Save = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME,...",
+        help="Further files: depth, points, masks of every frame, pictures at full size.",
+        show_default=False,
+    ),
+]
+
 
 def calibrate(
     maps: Maps,
@@ -108,6 +117,7 @@ def calibrate(
     pattern: Pattern = None,
     refine: Refine = True,
     live: Live = False,
+    save: Save = "",
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -126,6 +136,7 @@ def calibrate(
         from ..solve.options import Options
         from .decode import decode_images
 
+        extras = _extras(save)
         prepare_folder(out, Kind.CALIBRATION, [*maps, rig, *([resume] if resume else [])])
         checkpoint = None if resume is None else load_checkpoint(resume)
         paths = decode_images(maps, rig, pattern, refine, aside, output)
@@ -137,12 +148,22 @@ def calibrate(
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
             solution = solve_and_write(
-                frames, rig_record, options, out, output, checkpoint, show, decoded
+                frames, rig_record, options, out, output, checkpoint, show, decoded, extras
             )
             report(solution, out, output)
             if watch:
                 watch.end(solution, output)
         raise typer.Exit(exit_code(solution))
+
+
+def _extras(text: str) -> list[str]:
+    """Return the names in a list of further files, refused before any work if unknown."""
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    if names:
+        from ..show.extras import check_extras
+
+        check_extras(names, "--save")
+    return names
 
 
 def load_input(
@@ -213,6 +234,7 @@ def solve_and_write(
     resume: "Checkpoint | None" = None,
     observe: "Observe | None" = None,
     decoded: Path | None = None,
+    extras: Sequence[str] = (),
 ) -> "Solution":
     """Calibrate with a progress bar, write the solution folder and return what it says."""
     with output.progress("Starting Mitsuba") as advance:
@@ -224,7 +246,7 @@ def solve_and_write(
 
         result = solve(maps, rig, options, advance, resume, observe)
         advance(0.95, "Drawing pictures")
-        return write_solution_folder(out, result, rig, decoded)
+        return write_solution_folder(out, result, rig, decoded, extras)
 
 
 def exit_code(solution: "Solution") -> int:

@@ -88,7 +88,7 @@ def segments(grid: CodedGrid) -> NDArray[np.float64]:
         np.stack([u, row - grid.step / 2 * (start - (start + end) * (u - left))], -1)
         for u in (np.maximum(left, -0.5), np.minimum(left + 1, grid.columns - 0.5))
     ]
-    return grid.pixels(np.concatenate([upright, np.stack(ends, 1)]))
+    return grid.pixels(np.concatenate([upright, np.stack(ends, 1)]).astype(np.float64))
 
 
 def _integers(light: NDArray[np.float32], bits: int) -> NDArray[Any]:

@@ -98,13 +98,8 @@ class CodedGrid:
 
     def brightness(self, q: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return the light (...) at ``q`` (..., 2), pattern pixels; a line's middle is 1."""
-        lattice = self._lattice(q)
-        lines = np.maximum(self._vertical(lattice), self._horizontal(lattice))
-        light = self.background + (1 - self.background) * lines
-        if self.zero_order == 0:
-            return light
-        away = ((np.asarray(q) - self._centre) ** 2).sum(-1)
-        return light + self.zero_order * np.exp(-0.5 * away / self.zero_order_size**2)
+        q = np.asarray(q, np.float64)
+        return self._light(q[..., 0], q[..., 1])
 
     def texture(self, width: int, height: int) -> NDArray[np.float32]:
         """Return the brightness of the whole pattern on ``height`` x ``width`` texels."""
@@ -113,7 +108,7 @@ class CodedGrid:
                   for p, n in ((self.width, width), (self.height, height))]  # fmt: skip
         x = _texels(self.width, width * repeat[0])
         y = _texels(self.height, height * repeat[1])
-        light = self.brightness(np.stack(np.meshgrid(x, y), -1))
+        light = self._light(x, y[:, None])
         blocks = light.reshape(height, repeat[1], width, repeat[0])
         return blocks.mean((1, 3)).astype(np.float32)
 
@@ -137,32 +132,40 @@ class CodedGrid:
     def _lattice(self, q: NDArray[np.floating]) -> NDArray[np.float64]:
         return (np.asarray(q, np.float64) - self._centre) / self.period + self._middle
 
-    def _vertical(self, lattice: NDArray[np.float64]) -> NDArray[np.float64]:
-        u, v = lattice[..., 0], lattice[..., 1]
-        across = u - np.clip(np.round(u), 0, self.columns - 1)
-        return self._profile(across, _beyond(v, self.rows))
+    def _light(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the light (...) at pattern pixels, arrays that broadcast."""
+        (cx, cy), (mx, my) = self._centre, self._middle
+        u, v = (x - cx) / self.period + mx, (y - cy) / self.period + my
+        light = self.background + (1 - self.background) * self._lines(u, v)
+        if self.zero_order == 0:
+            return light
+        away = (x - cx) ** 2 + (y - cy) ** 2
+        return light + self.zero_order * np.exp(-0.5 * away / self.zero_order_size**2)
 
-    def _horizontal(self, lattice: NDArray[np.float64]) -> NDArray[np.float64]:
-        u, v = lattice[..., 0], lattice[..., 1]
+    def _lines(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the light of the lines (...) at columns and rows, arrays that broadcast."""
+        across = u - np.clip(np.round(u), 0, self.columns - 1)
+        upright = across**2 + _beyond(v, self.rows) ** 2
+        nearest = np.minimum(upright, self._from_horizontal(u, v))
+        return np.exp(nearest * (-0.5 / self.line**2))
+
+    def _from_horizontal(
+        self, u: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the squared distance (...) to the nearest horizontal line, periods squared."""
         # A level node on either side lets the outer half pieces run on.
-        padded = np.pad(self.code, ((0, 0), (1, 1)))
+        code = np.pad(self.code, ((0, 0), (1, 1))) * (self.step / 2)
+        start, rise = code[:, :-1], code[:, :-1] + code[:, 1:]
         left = np.clip(np.floor(u).astype(int), -1, self.columns - 1)
         row = np.clip(np.round(v).astype(int), 0, self.rows - 1)
-        nearest = np.zeros_like(u)
+        nearest = np.inf
         # Steep pieces may come nearer to the neighbouring row than that row's own piece.
         for candidate in (row - 1, row, row + 1):
             known = np.clip(candidate, 0, self.rows - 1)
-            start, end = padded[known, left + 1], padded[known, left + 2]
-            rise = self.step / 2 * (start + end)
-            height = self.step / 2 * start - rise * (u - left)  # above the row, y points down
-            across = (v - known + height) / np.sqrt(1 + rise**2)
-            nearest = np.maximum(nearest, self._profile(across, _beyond(u, self.columns)))
-        return nearest
-
-    def _profile(
-        self, across: NDArray[np.float64], beyond: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        return np.exp(-0.5 * (across**2 + beyond**2) / self.line**2)
+            slope = rise[known, left + 1]
+            height = start[known, left + 1] - slope * (u - left)  # above the row, y points down
+            nearest = np.minimum(nearest, (v - known + height) ** 2 / (1 + slope**2))
+        return nearest + _beyond(u, self.columns) ** 2
 
 
 def _beyond(along: NDArray[np.float64], count: int) -> NDArray[np.float64]:

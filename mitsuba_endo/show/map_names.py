@@ -1,4 +1,4 @@
-"""File names of maps and surfaces in a solution folder."""
+"""File names of a frame's maps, surfaces and other files in a solution folder."""
 
 import re
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ SURFACE = "surface.ply"
 
 def map_names(frames: Sequence[str]) -> list[str]:
     """Return the file names of the rendered maps: ``rendered.exr``, or one a frame."""
-    return _names("rendered", frames)
+    return file_names("rendered", frames)
 
 
 def observed_names(frames: Sequence[str]) -> list[str]:
     """Return the file names of the observed maps: ``observed.exr``, or one a frame."""
-    return _names("observed", frames)
+    return file_names("observed", frames)
 
 
 def own_surface_name(frame: int) -> str:
@@ -22,8 +22,9 @@ def own_surface_name(frame: int) -> str:
     return f"surface_{frame:02d}.ply" if frame else SURFACE
 
 
-def _names(kind: str, frames: Sequence[str]) -> list[str]:
+def file_names(kind: str, frames: Sequence[str], suffix: str = ".exr") -> list[str]:
+    """Return a file name of a kind for every frame: with the frame's number and name if several."""
     if len(frames) == 1:
-        return [f"{kind}.exr"]
+        return [f"{kind}{suffix}"]
     plain = [re.sub(r"[^\w.-]+", "_", frame) for frame in frames]
-    return [f"{kind}_{i:02d}_{Path(name).stem}.exr" for i, name in enumerate(plain)]
+    return [f"{kind}_{i:02d}_{Path(name).stem}{suffix}" for i, name in enumerate(plain)]

@@ -2,6 +2,7 @@
 
 import csv
 import shutil
+from collections.abc import Sequence
 from dataclasses import astuple, fields, replace
 from pathlib import Path
 
@@ -20,11 +21,12 @@ from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
 from ..records.surface import MODES, save_modes, save_surface
 from . import figures
+from .extras import EXTRAS, check_extras
 from .map_names import SURFACE, map_names, observed_names, own_surface_name
 from .read_folder import save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
-from .view import SurfaceView, view_surface
+from .view import view_surface
 
 SCENE = "scene.xml"
 DECODED = "decoded"
@@ -36,6 +38,7 @@ def write_solution_folder(
     calibration: Calibration,
     rig: Rig | None = None,
     decoded: str | Path | None = None,
+    extras: Sequence[str] = (),
 ) -> Solution:
     """Write everything a calibration found, all of it or nothing.
 
@@ -55,18 +58,23 @@ def write_solution_folder(
     rig.yaml              the rig with all defaults filled in, if given
     report.html           look at this first: verdict, maps, numbers, provenance; needs no network
     decoded/              copies of the files of the folder ``decoded``, if given
-    overview.png          the same at one look; the other pictures show the same at full size:
-                          observed, rendered, residual, histogram, surface, convergence
+    overview.png          the same at one look
     ====================  =========================================================================
+
+    And, of :data:`.extras.EXTRAS`, the files that ``extras`` names.
 
     Returns:
         The solution as written: with the surface's file name and any new warning.
 
     Raises:
-        InputError: the folder holds other files or cannot be written.
+        InputError: the folder holds other files or cannot be written, or an unknown extra.
     """
+    check_extras(extras, "extras")
     with atomic_folder(path, Kind.CALIBRATION) as folder:
+        view = view_surface(calibration.surface, calibration.camera)
         solution = _write_scene(folder, calibration, rig)
+        warnings = [w for name in extras for w in EXTRAS[name](folder, calibration, view)]
+        solution = solution.model_copy(update={"warnings": [*solution.warnings, *warnings]})
         save_solution(folder / "solution.json", solution)
         save_surface(folder / SURFACE, calibration.surface)
         for k, surface in calibration.own_surfaces.items():
@@ -84,8 +92,7 @@ def write_solution_folder(
             save_observed(folder / name, frame)
         if rig is not None:
             _save_rig(folder / "rig.yaml", rig)
-        view = view_surface(calibration.surface, calibration.camera)
-        _save_pictures(folder, calibration, view)
+        figures.save_figure(folder / "overview.png", figures.overview_figure(calibration, view))
         shown = replace(calibration, solution=solution)
         save_report(folder / REPORT, [(Path(path).name, shown)], [view])
         if decoded is not None:
@@ -113,24 +120,6 @@ def _save_rig(path: Path, rig: Rig) -> None:
     with atomic_path(path) as aside:
         text = yaml.safe_dump(rig.model_dump(mode="json"), sort_keys=False)
         aside.write_text(text, encoding="utf-8")
-
-
-def _save_pictures(folder: Path, calibration: Calibration, view: SurfaceView) -> None:
-    frames, solution, trace = calibration.frames, calibration.solution, calibration.trace
-    unit = figures.unit_name(solution)
-    scale = trace[-1].scale_px if trace else None
-    pictures = {
-        "overview": figures.overview_figure(calibration, view),
-        "observed": figures.coordinates_figure(frames, "observed"),
-        "rendered": figures.coordinates_figure(frames, "rendered"),
-        "residual": figures.residual_figure(frames),
-        "histogram": figures.histogram_figure(frames, solution.noise_px, scale),
-        "surface": figures.surface_figure(view, unit),
-    }
-    if trace:
-        pictures["convergence"] = figures.convergence_figure(trace)
-    for name, figure in pictures.items():
-        figures.save_figure(folder / f"{name}.png", figure)
 
 
 def _write_scene(folder: Path, calibration: Calibration, rig: Rig | None) -> Solution:

@@ -13,7 +13,7 @@ import yaml
 import mitsuba_endo as me
 from mitsuba_endo import backend
 from mitsuba_endo.errors import NothingDecodedError
-from mitsuba_endo.records.correspondence import CorrespondenceMap, save_map
+from mitsuba_endo.records.correspondence import CorrespondenceMap, read_exr, save_map
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.solve.options import Options
 from tests.decoding.grid_views import CAMERA, photo, view
@@ -108,12 +108,15 @@ def test_distance(case: tuple[Views, me.Result], frame: int):
 def test_saved_and_loaded(case: tuple[Views, me.Result], tmp_path: Path):
     """Oracle: the result in memory; a surface file holds single precision."""
     _, result = case
-    result.save(tmp_path / "out")
+    result.save(tmp_path / "out", extras=["depth"])
     again = me.load(tmp_path / "out")
     assert again.solution.projector == result.solution.projector
     assert again.rig == result.rig
     np.testing.assert_allclose(again.depth(1), result.depth(1), rtol=1e-5)
     assert again.verdict == result.verdict
+    for k in (0, 1):
+        (path,) = (tmp_path / "out").glob(f"depth_0{k}_*.exr")
+        np.testing.assert_allclose(read_exr(path)["Z"], result.depth(k), rtol=1e-6)
     assert "2 frames, converged" in repr(again)
     assert "mitsuba-endo" in again._repr_html_()
 

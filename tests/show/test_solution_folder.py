@@ -10,11 +10,13 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.records.calibration import Calibration
-from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.correspondence import load_map, read_exr
 from mitsuba_endo.records.rig import Rig, load_rig
 from mitsuba_endo.records.solution import Estimate, PoseEstimate, load_solution
 from mitsuba_endo.records.surface import load_surface
@@ -28,6 +30,7 @@ PICTURES = {
     "overview.png", "observed.png", "rendered.png", "residual.png", "histogram.png",
     "surface.png", "convergence.png",
 }  # fmt: skip
+EXTRA = {"depth.exr", "points.ply", "mask.png"}
 FILES = {
     "solution.json",
     "surface.ply",
@@ -50,20 +53,20 @@ def calibration(make_calibration: Maker) -> Calibration:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory, calibration: Calibration) -> Path:
     path = tmp_path_factory.mktemp("results") / "out"
-    write_solution_folder(path, calibration)
+    write_solution_folder(path, calibration, extras=("depth", "points", "masks", "pictures"))
     return path
 
 
 @pytest.fixture
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures, which take a second and are not what these tests look at."""
-    monkeypatch.setattr(solution_folder, "_save_pictures", lambda *_: None)
+    monkeypatch.setattr(solution_folder.figures, "save_figure", lambda *_: None)
     monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
 
 
 def test_files(written: Path):
     """Oracle: the list in the documentation."""
-    assert {p.name for p in written.iterdir()} == FILES | PICTURES
+    assert {p.name for p in written.iterdir()} == FILES | PICTURES | EXTRA
 
 
 def test_solution_is_the_calibrations(written: Path, calibration: Calibration):
@@ -93,6 +96,31 @@ def test_trace(written: Path, calibration: Calibration):
     assert len(rows) == len(calibration.trace)
     for row, expected in zip(rows, calibration.trace, strict=True):
         assert {k: float(v) for k, v in row.items()} == vars(expected)
+
+
+def test_depth_points_and_mask(written: Path, calibration: Calibration):
+    """Oracle: the surface itself: each point lies in the plane of a triangle, to float32."""
+    depth = read_exr(written / "depth.exr")["Z"]
+    cloud = trimesh.load(written / "points.ply")
+    points = np.asarray(cloud.vertices)
+    assert len(points) == np.isfinite(depth).sum() > 1000
+    np.testing.assert_allclose(points[:, 2], depth[np.isfinite(depth)], rtol=1e-6)
+    surface = calibration.surface
+    distance = distance_to_mesh(points[::20], surface.vertices, surface.faces)
+    assert distance.max() < 1e-4
+    mask = cv2.imread(str(written / "mask.png"), cv2.IMREAD_UNCHANGED)
+    frame = calibration.frames[0]
+    np.testing.assert_array_equal(mask == 255, frame.used)
+    np.testing.assert_array_equal(mask > 0, np.isfinite(frame.observed).all(-1) | frame.used)
+
+
+def test_nothing_extra_unless_asked(tmp_path: Path, calibration: Calibration):
+    """Oracle: the list in the documentation; an unknown name is refused before anything is."""
+    write_solution_folder(tmp_path / "out", calibration)
+    assert {p.name for p in (tmp_path / "out").iterdir()} == FILES | {"overview.png"}
+    with pytest.raises(InputError, match="extras: 'deep' is unknown; choose from depth"):
+        write_solution_folder(tmp_path / "no", calibration, extras=["deep"])
+    assert not (tmp_path / "no").exists()
 
 
 def test_pictures_are_readable(written: Path):
@@ -211,7 +239,7 @@ def test_unknown_values_do_not_stop_the_pictures(tmp_path: Path, calibration: Ca
     changed = _with_focal(calibration, Estimate(value=None, **UNKNOWN))
     unknown = PoseEstimate(R=None, t=None, **UNKNOWN)
     write_solution_folder(tmp_path / "out", _with_frame(changed, projector_from_camera=unknown))
-    assert {p.name for p in (tmp_path / "out").iterdir()} >= PICTURES
+    assert {p.name for p in (tmp_path / "out").iterdir()} >= {"overview.png", "report.html"}
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -264,7 +292,7 @@ def test_interrupted_leaves_the_old_or_nothing(
 ):
     """Oracle: the folder's content before Ctrl-C fell into the drawing of the pictures."""
     out = tmp_path / "out"
-    monkeypatch.setattr(solution_folder, "_save_pictures", lambda *_: None)
+    monkeypatch.setattr(solution_folder.figures, "save_figure", lambda *_: None)
     monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
     if existing:
         write_solution_folder(out, calibration)
@@ -273,7 +301,7 @@ def test_interrupted_leaves_the_old_or_nothing(
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(solution_folder, "_save_pictures", interrupt)
+    monkeypatch.setattr(solution_folder.figures, "save_figure", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_solution_folder(out, calibration)
     assert sorted(str(p) for p in tmp_path.rglob("*")) == before

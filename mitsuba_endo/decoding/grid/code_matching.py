@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
+from scipy.fft import irfft2, next_fast_len, rfft2
 
 from ..network import CODES
 from .settings import MatcherSettings
@@ -98,7 +98,7 @@ class CodeMatcher:
         outside = self.settings.outside
         # A node inside the pattern gives back the penalty that all begin with.
         image = _image(index, self.read - outside, index.min(0), index.max(0))
-        table = fftconvolve(self._one_hot, image[:, ::-1, ::-1], axes=(1, 2)).sum(0)
+        table = _convolved(self._one_hot, image[:, ::-1, ::-1])
         height, width = image.shape[1:]
         return table + outside * len(index), -index.min(0) - np.array([width - 1, height - 1])
 
@@ -206,3 +206,14 @@ def potts_labels(
         outgoing -= outgoing.min(1, keepdims=True)
         message = damping * message + (1 - damping) * np.minimum(outgoing, both)
     return beliefs().argmin(1)
+
+
+def _convolved(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over layers (first axis) of the full convolutions of their images.
+
+    One inverse transform serves all layers.
+    """
+    (_, m, n), (_, p, q) = a.shape, b.shape
+    size = [next_fast_len(m + p - 1, real=True), next_fast_len(n + q - 1, real=True)]
+    product = np.asarray(rfft2(a, size)) * np.asarray(rfft2(b, size))
+    return np.asarray(irfft2(product.sum(0), size))[: m + p - 1, : n + q - 1]
