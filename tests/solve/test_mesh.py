@@ -1,20 +1,29 @@
 """The triangle mesh as a surface. Oracles: affine functions, differences, the lattice."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
+import trimesh
 
+from mitsuba_endo.fusion import FusedMesh
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.solve import pipeline
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.costs.problem import Problem, evaluate, make_problem
 from mitsuba_endo.solve.costs.smoothness import smoothness
+from mitsuba_endo.solve.frames.edge_lengths import edge_lengths
 from mitsuba_endo.solve.frames.joint import joint_problem
+from mitsuba_endo.solve.inference.fit import FrameSolution
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.surfaces.hinges import hinge_operator
 from mitsuba_endo.solve.surfaces.lattice import Lattice, lattice_over
 from mitsuba_endo.solve.surfaces.mesh import TriangleMesh, triangle_mesh
 from mitsuba_endo.solve.unknowns.state import State
+from scripts.benchmarks.frames import make_frames, sheet_distances
+from scripts.benchmarks.joint import errors
 from tests.solve.problems import problem_of, small_rig
 from tests.solve.views import Views, focal_error, frame_errors, relief
 
@@ -152,6 +161,56 @@ def test_reaches_the_lattice_on_its_own_triangles(
     for frame in mesh.solution.frames:
         assert abs(frame_errors(three_views, frame).baseline) < 1e-3
     assert shape_error(mesh) < 1.1 * shape_error(lattice)
+
+
+def test_a_smooth_sheet_is_as_good_as_on_the_lattice_with_fewer_vertices(llvm: str) -> None:
+    """Oracle: the true sheet of the benchmark, coarser; 0.1 % of focal length.
+
+    The sheet bends little for its noise, which is ten times that of the lumen at this distance.
+    """
+    frames = make_frames(4, 0, pixels=100)
+    found = {
+        surface: calibrate(frames.maps, frames.rig, Options(surface=surface, jackknife=False))
+        for surface in ("mesh", "lattice")
+    }
+    focal, baseline = errors(frames, found["mesh"])
+    assert focal < 0.1
+    assert baseline < 0.5
+    shape = {
+        surface: np.sqrt(np.mean(sheet_distances(result.surface.vertices) ** 2))
+        for surface, result in found.items()
+    }
+    assert shape["mesh"] < 1.1 * shape["lattice"]
+    assert len(found["mesh"].surface.vertices) < len(found["lattice"].surface.vertices)
+
+
+@pytest.mark.parametrize(("noise", "bend"), [(4.0, 1.0), (1.0, 4.0), (1.0, 1 / 4)])
+def test_edges_grow_with_noise_and_shrink_with_curvature(noise: float, bend: float) -> None:
+    """Oracle: the cube root of noise over curvature, between the limits."""
+    frames, fine = hollow_sphere(noise=1.0, radius=1.0)
+    distances = np.full(len(fine.vertices), 5.0)
+    before = edge_lengths(fine, frames, distances, 300.0)
+    frames, fine = hollow_sphere(noise=noise, radius=1 / bend)
+    after = edge_lengths(fine, frames, distances, 300.0)
+    assert np.median(after / before) == pytest.approx(np.cbrt(noise / bend), rel=0.02)
+    spacing = 5.0 * frames[0].cell
+    for extreme, limit in ((1e6, 2.5), (1e-9, 0.7)):
+        frames, fine = hollow_sphere(noise=extreme, radius=1.0)
+        at_limit = edge_lengths(fine, frames, distances, 300.0)
+        np.testing.assert_allclose(at_limit, limit * spacing, rtol=1e-9)
+
+
+def hollow_sphere(noise: float, radius: float) -> tuple[list[FrameSolution], FusedMesh]:
+    """What one frame found of it alone, as far as edges depend on that, and a mesh of it."""
+    mesh = trimesh.creation.icosphere(3, radius)
+    vertices, faces = np.array(mesh.vertices), np.array(mesh.faces, np.int64)
+    count = len(vertices)
+    fine = FusedMesh(vertices, faces, -vertices / radius, np.full(count, 3), np.full(count, np.nan))
+    alone = SimpleNamespace(
+        cell=0.02, points=np.zeros((100, 3)), observations=SimpleNamespace(count=900),
+        squared=np.full(900, 2 * np.log(2) * noise**2),
+    )  # fmt: skip
+    return cast("list[FrameSolution]", [alone]), fine
 
 
 def shape_error(result: Calibration) -> float:

@@ -199,11 +199,15 @@ class Evaluation:
 
     def noise(self) -> float:
         """Return the robust standard deviation of one whitened component, pattern pixels."""
-        r2 = np.concatenate([r.squared for r in self.frames])
-        r2 = r2[np.isfinite(r2)]
-        if not len(r2):
-            return _SMALLEST_NOISE
-        return max(float(np.sqrt(np.median(r2))) / _MEDIAN_RADIUS, _SMALLEST_NOISE)
+        return robust_noise(np.concatenate([r.squared for r in self.frames]))
+
+
+def robust_noise(squared: Floats) -> float:
+    """Return the standard deviation of one component, from squared lengths (N,), NaN = none."""
+    squared = squared[np.isfinite(squared)]
+    if not len(squared):
+        return _SMALLEST_NOISE
+    return max(float(np.sqrt(np.median(squared))) / _MEDIAN_RADIUS, _SMALLEST_NOISE)
 
 
 def evaluate(problem: Problem, state: State) -> Evaluation:

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...fusion import FusedMesh, RangeFrame, Volume, surface_of
+from ...fusion import RangeFrame, Volume, surface_of
+from ...fusion.clean import areas
+from ...fusion.fuse import vertex_normals
+from ...fusion.remesh import remesh
 from ...geometry.cameras import CameraModel
-from ...geometry.transforms import RigidTransform
 from ...records.rig import Rig
 from ...start.registration import Registration
 from ..costs.problem import Problem, make_problem
@@ -22,6 +24,7 @@ from ..inference.fit import FrameSolution
 from ..surfaces.mesh import triangle_mesh
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
+from .edge_lengths import edge_lengths
 from .joint import disparity_of, registered_values
 
 Floats = NDArray[np.float64]
@@ -30,12 +33,8 @@ MAX_VERTICES = 20_000
 """Of the mesh: a banded factorisation takes 0.1 s then, and four times that at 40,000."""
 _AREA = np.sqrt(3) / 2
 """Area of the surface per vertex over the square of the edges' length: equilateral triangles."""
-_FINER = 0.7
-"""Length of the edges over the spacing of the frames' own surfaces: several frames see each place.
-In a colon with folds of 3 mm, chords as long as that spacing miss the surface by twice what noise
-does."""
-_VOXEL = 0.5
-"""Side of a voxel over the edges' length: fine enough that decimation chooses the vertices."""
+_VOXEL = 0.35
+"""Side of a voxel over the spacing of the frames' own surfaces: finer than the shortest edges."""
 
 
 def joint_mesh_problem(
@@ -68,39 +67,42 @@ def joint_mesh_problem(
         for frame, place in zip(frames, registered, strict=True)
         if frame.range is not None
     ]
-    fused = _fused(views, _spacing(frames, registered))
-    distances = _distances(fused.vertices, [v.world_from_camera for v in views])
-    mesh, _ = triangle_mesh(fused.vertices, fused.faces, fused.normals, distances)
-    state = layout.state([np.zeros(mesh.size)], registered_values(frames, registered))
+    values = registered_values(frames, registered)
+    disparity = disparity_of(layout.state([np.zeros(1)], values))
+    vertices, faces = _fused(views, frames, _VOXEL * _spacing(frames, registered), disparity)
+    directions, distances = vertex_normals(vertices, faces), _distances(vertices, views)
+    mesh, _ = triangle_mesh(vertices, faces, directions, distances)
+    state = layout.state([np.zeros(mesh.size)], values)
     weight = prior_weight(mesh, sum(f.observations.count for f in frames))
-    terms = [smoothness(mesh, 0, weight, disparity_of(state)), *priors_of(rig, layout)]
+    terms = [smoothness(mesh, 0, weight, disparity), *priors_of(rig, layout)]
     observed = [f.observations for f in frames]
     return make_problem(observed, [mesh], state, layout, law, terms), state
 
 
 def _spacing(frames: Sequence[FrameSolution], registered: Sequence[Registration]) -> float:
-    """Return the length that edges shall have, baselines of the first frame."""
+    """Return the spacing of the frames' own surfaces, baselines of the first frame."""
     sizes = [
         place.scale * frame.cell * float(np.median(np.linalg.norm(frame.points, axis=1)))
         for frame, place in zip(frames, registered, strict=True)
     ]
-    return _FINER * float(np.median(sizes))
+    return float(np.median(sizes))
 
 
-def _fused(views: Sequence[RangeFrame], spacing: float) -> FusedMesh:
-    """Return a mesh with edges of about a length, of at most :data:`MAX_VERTICES` vertices."""
-    volume = Volume(_VOXEL * spacing)
+def _fused(
+    views: Sequence[RangeFrame], frames: Sequence[FrameSolution], voxel: float, disparity: float
+) -> tuple[Floats, NDArray[np.int64]]:
+    """Return vertices and faces of what frames see, as fine as it needs and the limit allows."""
+    volume = Volume(voxel)
     for view in views:
         volume.integrate(view)
     fine = surface_of(volume)
-    corners = fine.vertices[fine.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = float(np.linalg.norm(normals, axis=1).sum()) / 2
-    wanted = min(int(area / (_AREA * spacing**2)), MAX_VERTICES)
-    return surface_of(volume, vertices=wanted) if wanted < len(fine.vertices) else fine
+    edge = edge_lengths(fine, frames, _distances(fine.vertices, views), disparity)
+    of_faces = edge[fine.faces].mean(1)
+    count = float(np.sum(areas(fine.vertices, fine.faces) / (_AREA * of_faces**2)))
+    return remesh(fine.vertices, fine.faces, edge * np.sqrt(max(count / MAX_VERTICES, 1.0)))
 
 
-def _distances(vertices: Floats, cameras: Sequence[RigidTransform]) -> Floats:
+def _distances(vertices: Floats, views: Sequence[RangeFrame]) -> Floats:
     """Return how far (V,) the nearest camera is from every vertex."""
-    all_ = np.array([np.linalg.norm(vertices - pose.t, axis=1) for pose in cameras])
+    all_ = np.array([np.linalg.norm(vertices - v.world_from_camera.t, axis=1) for v in views])
     return all_.min(0)
