@@ -22,6 +22,12 @@ Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(gt=0, le=LARGEST)]
 Size = Annotated[int, Field(gt=0, le=65_536)]
 """Width or height of an image or pattern, pixels."""
+Vector2 = Annotated[list[Real], Field(min_length=2, max_length=2)]
+Vector3 = Annotated[list[Real], Field(min_length=3, max_length=3)]
+Matrix3 = Annotated[
+    list[Annotated[list[Real], Field(min_length=3, max_length=3)]],
+    Field(min_length=3, max_length=3),
+]
 
 
 def validate(model: type[R], data: dict[str, Any], source: str) -> R:

@@ -18,7 +18,7 @@ from mitsuba_endo.geometry.arrays import namespace
 from mitsuba_endo.geometry.cameras import CAMERAS, CameraModel, register_camera
 from mitsuba_endo.geometry.laws import LAWS, register_law
 from mitsuba_endo.geometry.transforms import rotation_angle
-from mitsuba_endo.records import rig as rig_records
+from mitsuba_endo.records import sharing
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.rendering.coordinates import FrameModel
@@ -49,7 +49,7 @@ QUICK = Options(jackknife=False)
 @pytest.fixture(autouse=True)
 def registries_as_before() -> Iterator[None]:
     registries: list[Any] = [BLOCKS, MINIMISERS, SURFACES, LAWS, CAMERAS]
-    further = rig_records._FURTHER_BLOCKS
+    further = sharing._FURTHER_BLOCKS
     kept = [dict(r) for r in registries], list(PRIORS), set(further)
     yield
     for registry, before in zip(registries, kept[0], strict=True):
