@@ -211,17 +211,20 @@ def with_sharing(rig: "Rig", text: str) -> "Rig":
     """Return the rig with entries of its sharing plan replaced, e.g. ``focal=fixed,centre=shared``.
 
     Raises:
-        InputError: not of the form block=mode, or an unknown block or mode.
+        InputError: not of the form block=mode, an unknown block or mode, or two for one block.
     """
     from ..errors import InputError
     from ..records.plan import with_plan
 
-    plan = {}
+    plan: dict[str, str] = {}
     for item in text.split(","):
         block, equals, mode = (part.strip() for part in item.partition("="))
         if not equals:
             raise InputError(f"'{item}' is not block=mode", "--share", "e.g. surface=per_frame")
-        plan[block] = mode
+        if plan.setdefault(block, mode) != mode:
+            raise InputError(
+                f"{block} is to be {plan[block]} and {mode}", "--share", "keep one of them"
+            )
     return with_plan(rig, plan, "--share")
 
 

@@ -10,6 +10,8 @@ from .validation import Length, Matrix3, Real, Record, Size
 
 LEAST_FOCAL = 1e-3
 """Pixels; with less, the whole of space lies within one."""
+LEAST_TERMS = 2
+"""Coefficients that can be unknowns where fewer are given: k1 and k2, or a model's first two."""
 
 
 class Camera(Record):
@@ -63,13 +65,20 @@ class Camera(Record):
 
     @model_validator(mode="after")
     def _deviation_count(self) -> "Camera":
-        given, std = len(self.distortion), self.distortion_std
-        if isinstance(std, list) and len(std) != max(given, 1):
+        names = CAMERAS[self.model].coefficients[: self.unknown_coefficients]
+        std = self.distortion_std
+        if isinstance(std, list) and len(std) != len(names):
             raise ValueError(
-                f"distortion_std has {len(std)} values and distortion {given}; give one for each "
-                "coefficient, or one number for all"
+                f"distortion_std has {len(std)} values and the coefficients that can be unknowns "
+                f"are {', '.join(names)}; give one for each, or one number for all"
             )
         return self
+
+    @property
+    def unknown_coefficients(self) -> int:
+        """Number of coefficients that are unknowns where the sharing plan makes them some."""
+        least = min(LEAST_TERMS, max(CAMERAS[self.model].max_coefficients))
+        return max(len(self.distortion), least)
 
     def to_model(self) -> CameraModel:
         return CameraModel(

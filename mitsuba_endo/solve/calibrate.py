@@ -15,6 +15,7 @@ from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
 from ..sanity.examine import examine
+from .contradictions import check_surface, unused_deviations
 from .frames.weights import balanced
 from .history import History
 from .inference.fit import Fit
@@ -53,6 +54,7 @@ def calibrate(
     say = progress or (lambda _share, _step: None)
     minimiser_of(options)  # an unknown one is told before any work
     examined = examine(as_maps(maps), rig)
+    check_surface(options, rig, len(examined.maps), resume)
     backend.ensure_derivatives()
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.
@@ -65,7 +67,9 @@ def calibrate(
         fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
-        return assemble(fit, camera, rig, options, evidence, [*examined.warnings, *warnings])
+        unused = unused_deviations(rig, fit.result.problem.layout, options)
+        told = [*examined.warnings, *unused, *warnings]
+        return assemble(fit, camera, rig, options, evidence, told)
 
 
 def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:

@@ -102,6 +102,23 @@ RIGS = {
         "projector.pose.R",
     ),
     "fixed focal without value": (_set("projector", "focal", {"refine": False}), "projector.focal"),
+    "negative deviation of the baseline": (
+        _set("scale", {"baseline": 6.0, "baseline_std": -0.1}), "scale.baseline_std",
+    ),
+    "drift without spread": (_set("drift", {"insertion_mm": 0.0}), "drift.insertion_mm"),
+    "negative drift": (_set("drift", {"roll_deg": -1.0}), "drift.roll_deg"),
+    "camera matrix known exactly, and refined": (
+        _set("camera", "K_std", [1.0, 0.0, 1.0, 1.0]), "camera.K_std",
+    ),
+    "negative deviation of a coefficient": (
+        _set("camera", "distortion_std", [0.01, -0.01]), "camera.distortion_std",
+    ),
+    "fewer deviations than coefficients": (
+        _set("camera", "distortion_std", [0.01]), "camera", "k1, k2", "one number for all",
+    ),
+    "projector's centre known exactly, and refined": (
+        _set("projector", "centre_std", [0.0, 1.0]), "projector.centre_std",
+    ),
     "missing camera": ({k: v for k, v in rig().items() if k != "camera"}, "camera", "missing"),
 }  # fmt: skip
 
@@ -144,11 +161,45 @@ def test_damaged_map(tmp_path: Path):
         ("surfase=shared", "did you mean 'surface'"),
         ("surface=sometimes", "surface"),
         ("focal=fixed,", "'' is not block=mode"),
+        ("focal=fixed,focal=shared", "focal is to be fixed and shared"),
     ],
 )
 def test_share(tmp_path: Path, share: str, expected: str):
     write(tmp_path)
     _check(_calibrate(tmp_path, "--share", share), "--share", expected)
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"),
+    [
+        ("surface=fixed", "share.surface"),
+        ("focal=fixed", "projector.focal.value"),
+        ("projector_pose=fixed", "projector.pose"),
+        ("camera_pose=shared", "share.camera_pose"),
+        ("camera_pose=fixed", "share.camera_pose"),
+        ("camera_focal=per_frame", "share.camera_focal"),
+        ("projector_pose=shared", "drift"),
+        ("drift=shared", "--share"),
+    ],
+)
+def test_contradictory_plan(tmp_path: Path, share: str, expected: str):
+    """Two frames, and a drift of the projector from one to the next."""
+    write(tmp_path, rig_data=_set("drift", {"roll_deg": 1.0}))
+    np.savez(tmp_path / "second.npz", map=q() + np.float32(0.5))
+    before = _listing(tmp_path)
+    _check(_calibrate(tmp_path, tmp_path / "second.npz", "--share", share), expected)
+    assert _listing(tmp_path) == before
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_mesh_of_nothing_in_common(tmp_path: Path, own: bool):
+    """One frame, and two that share no surface: no lattice is solved in the mesh's stead."""
+    write(tmp_path)
+    np.savez(tmp_path / "second.npz", map=q() + np.float32(0.5))
+    more = [tmp_path / "second.npz", "--share", "surface=per_frame"] if own else []
+    expected = "share.surface: shared" if own else "give more maps"
+    _check(_calibrate(tmp_path, "--surface", "mesh", *more), "surface", "mesh", expected)
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("out", ["taken/out", "taken"])

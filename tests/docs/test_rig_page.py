@@ -10,12 +10,14 @@ import yaml
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.rig import Camera, Rig
 from mitsuba_endo.solve.calibrate import calibrate
+from mitsuba_endo.solve.contradictions import check_surface
 from mitsuba_endo.solve.costs.gaussian_prior import gaussian_prior
 from mitsuba_endo.solve.frames.initialisation import start_frame
 from mitsuba_endo.solve.minimisers.minimise import minimiser_of
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
+from tests.rigs import with_noise
 from tests.solve.problems import map_of, rig_file, small_rig
 
 PAGE = (Path(__file__).parents[2] / "docs" / "rig.md").read_text("utf-8")
@@ -140,13 +142,32 @@ def test_the_old_name_of_the_solver_is_understood() -> None:
 
 
 @pytest.mark.usefixtures("llvm")
-def test_a_mesh_is_for_frames_that_share_a_surface() -> None:
-    """Oracle: the same numbers to the last bit where there is but one frame."""
-    rig = small_rig("direction_cosine")
-    focals = [
-        calibrate(
-            [map_of(rig)], rig_file(rig), Options(jackknife=False, surface=surface)
-        ).solution.projector.focal
-        for surface in ("lattice", "mesh")
-    ]
-    assert focals[0] == focals[1]
+@pytest.mark.parametrize("check_model", [False, True])
+def test_deviations_without_effect_are_warned_of(check_model: bool) -> None:
+    """Oracle: fields that are priors of fixed values alone, unless the model is checked."""
+    rig = with_noise(small_rig("direction_cosine"), 0.1, 0)
+    camera = {**Camera.from_model(rig.camera).model_dump(), **TestCameraIntrinsics.STD}
+    record = rig_file(rig, camera=camera, share={"camera_centre": "shared"})
+    options = Options(jackknife=False, check_model=check_model)
+    told = calibrate([map_of(rig)], record, options).solution.warnings
+    assert any(w.startswith("camera.distortion_std: has no effect") for w in told) != check_model
+    assert not any("K_std" in w for w in told), "the centre's are used"
+
+
+@pytest.mark.parametrize(
+    ("record", "frames", "options"),
+    [
+        ({}, 1, {}),
+        ({"share": {"surface": "per_frame"}}, 2, {}),
+        ({}, 2, {"cameras": "identity"}),
+    ],
+)
+def test_a_mesh_is_for_frames_that_share_a_surface(
+    record: dict[str, Any], frames: int, options: dict[str, Any]
+) -> None:
+    """Oracle: an InputError about the surface or the cameras, none with a lattice."""
+    rig = rig_with(**record)
+    check_surface(Options(**options), rig, frames, None)
+    with pytest.raises(InputError, match="mesh"):
+        check_surface(Options(surface="mesh", **options), rig, frames, None)
+    check_surface(Options(surface="mesh"), rig_with(), 2, None)

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES
+from mitsuba_endo.records.rig import MAX_PROJECTOR_DISTORTION, Camera
 from mitsuba_endo.solve.costs.problem import make_problem
 from mitsuba_endo.solve.surfaces.lattice import Lattice, lattice_over
+from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import lopsided_camera
@@ -52,6 +56,20 @@ class TestColumns:
         assert layout.slots == {("projector_pose", 0): slice(0, 5), ("focal", 0): slice(5, 6)}
         assert layout.columns == 6
         assert layout.active(0) == ("projector_pose", "focal")
+
+    @pytest.mark.parametrize("model", CAMERAS)
+    def test_the_fewest_correspondences_are_more_than_all_unknowns(self, model: str):
+        """Oracle: with fewer than so many a map is refused; every block is an unknown."""
+        most = CAMERAS[model].max_coefficients[-1]
+        camera = {**Camera.from_model(RIG.camera).model_dump(), "model": model,
+                  "distortion": [0.0] * most}  # fmt: skip
+        own = {n: "per_frame" for n, b in BLOCKS.items() if "per_frame" in b.modes}
+        rest = dict.fromkeys(BLOCKS.keys() - own.keys(), "shared")
+        projector = {"distortion": [0.0] * MAX_PROJECTOR_DISTORTION}
+        for frames in (1, 7):
+            layout = layout_of(frames, camera=camera, projector=projector, share={**own, **rest})
+            assert set(layout.widths) == {name for name, free in layout.free.items() if free}
+            assert 0 < layout.columns < 2 * MIN_CORRESPONDENCES * frames
 
     def test_shared_surface_with_poses_per_frame(self):
         """Oracle: only the first translation's length is held, the first camera is the world."""

@@ -158,6 +158,24 @@ def test_another_plan_is_refused(case: tuple[Views, Rig, Calibration]) -> None:
         calibrate(views.maps, other, QUICK, resume=checkpoint_of(oracle))
 
 
+def test_a_lattice_is_not_gone_on_with_as_a_mesh(case: tuple[Views, Rig, Calibration]) -> None:
+    views, rig, oracle = case
+    with pytest.raises(InputError, match="surface: the earlier calibration has no mesh"):
+        calibrate(views.maps, rig, replace(QUICK, surface="mesh"), resume=checkpoint_of(oracle))
+
+
+def test_a_mesh_is_gone_on_with() -> None:
+    """Oracle: the optimum resumed from and its faces, whether a mesh is asked for or not."""
+    views = look(relief_surface(), steps(2), projector_poses(2), width=72)
+    first = calibrate(views.maps, views.rig(), replace(QUICK, surface="mesh"))
+    for options in (QUICK, replace(QUICK, surface="mesh")):
+        second = calibrate(views.maps, views.rig(), options, resume=checkpoint_of(first))
+        assert_same_optimum(second, first)
+        (a,), (b,) = (checkpoint_of(c).surfaces for c in (first, second))
+        assert b.kind == "mesh"
+        np.testing.assert_array_equal(a.arrays["faces"], b.arrays["faces"])
+
+
 def test_command_goes_on_from_a_folder(tmp_path: Path) -> None:
     """Oracle: the folder resumed from, which had converged."""
     views = look(relief_surface(), steps(2), projector_poses(2))

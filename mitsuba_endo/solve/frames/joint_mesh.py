@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ...fusion import RangeFrame, Volume, surface_of
 from ...fusion.clean import areas
 from ...fusion.fuse import vertex_normals
@@ -54,14 +53,7 @@ def joint_mesh_problem(
         rig: what is known.
         layout: of the unknowns.
         law: name of the projector's projection model.
-
-    Raises:
-        InputError: the frames were not registered.
     """
-    if any(frame.range is None for frame in frames):
-        raise InputError(
-            "a mesh needs frames that were registered", "cameras", "use cameras=registration"
-        )
     views = [
         RangeFrame(place.scale * frame.range, camera, place.world_from_camera)
         for frame, place in zip(frames, registered, strict=True)

@@ -10,9 +10,6 @@ from ...records.rig import Rig, Sharing
 from ...rendering.coordinates import FrameModel
 from .block import Floats, Value, VectorBlock, register_block
 
-_LEAST_TERMS = 2
-"""Coefficients that are unknowns where the rig names none: k1 and k2."""
-
 _STD = {"k1": 0.005, "k2": 0.01, "p1": 0.001, "p2": 0.001}
 _OTHER_STD = 0.01
 """Of a careful calibration."""
@@ -28,9 +25,11 @@ class CameraDistortion(VectorBlock):
     modes: ClassVar[tuple[Sharing, ...]] = ("fixed", "shared")
 
     def given(self, rig: Rig) -> Floats:
-        coefficients, allowed = rig.camera.distortion, CAMERAS[rig.camera.model].max_coefficients
-        least = 0 if self.sharing(rig) == "fixed" else min(_LEAST_TERMS, max(allowed))
-        return np.array([*coefficients, *[0.0] * (least - len(coefficients))])
+        coefficients = rig.camera.distortion
+        count = len(coefficients)
+        if self.sharing(rig) != "fixed":
+            count = rig.camera.unknown_coefficients
+        return np.array([*coefficients, *[0.0] * (count - len(coefficients))])
 
     def names(self, rig: Rig) -> tuple[str, ...]:
         return CAMERAS[rig.camera.model].coefficients[: len(self.given(rig))]
@@ -45,7 +44,7 @@ class CameraDistortion(VectorBlock):
         std = rig.camera.distortion_std
         if std is None:
             return None
-        return np.full(len(value), std) if isinstance(std, float) else np.array(std, float)
+        return np.array(std[: len(value)]) if isinstance(std, list) else np.full(len(value), std)
 
     def doubt(self, rig: Rig, value: Value) -> Floats:
         std = self.prior_std(rig, value)
