@@ -13,7 +13,7 @@ import numpy as np
 from mitsuba_endo.dataset.config import Config
 from mitsuba_endo.dataset.local_pool import LocalPool
 from mitsuba_endo.dataset.run import Progress, make_dataset
-from mitsuba_endo.dataset.work import DatasetJob, Result, prepare, produce
+from mitsuba_endo.dataset.work import DatasetJob, SampleOutcome, prepare, produce
 
 from .report import Figure, timed
 
@@ -102,7 +102,7 @@ def prepare_stopwatch() -> None:
     mi.render = render
 
 
-def produce_noted(job: DatasetJob, index: int) -> Result:
+def produce_noted(job: DatasetJob, index: int) -> SampleOutcome:
     """Make a sample; note how long it rendered and how much memory the process has."""
     before = _rendering[0]
     result = produce(job, index)
