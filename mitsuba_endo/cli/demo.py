@@ -25,9 +25,8 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 SCENE = "stomach"
 SETTINGS = {
     "width": "320", "height": "240", "fx": "226.7", "cx": "160.6", "cy": "118.1",
-    "pattern": "pattern:coded",
 }  # fmt: skip
-"""The scene's camera at two thirds of its resolution, and a pattern that can be decoded."""
+"""The scene's camera at two thirds of its resolution."""
 SPP = 32
 IMAGE = "image.png"
 

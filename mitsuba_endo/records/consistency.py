@@ -36,10 +36,19 @@ def as_maps(maps: Iterable[CorrespondenceMap]) -> list[CorrespondenceMap]:
 
 
 def _check_arrays(map_: CorrespondenceMap) -> None:
-    q, weight = map_.q, map_.weight
+    q, weight, covariance = map_.q, map_.weight, map_.covariance
     if not _is_numbers(q) or q.ndim != 3 or q.shape[2] != 2:
         form = getattr(q, "shape", type(q).__name__)
         raise InputError(f"q is {form}, not (H, W, 2) numbers", f"{map_.name}: map", "mend it")
+    if covariance is not None:
+        if not _is_numbers(covariance) or covariance.shape != (*q.shape[:2], 3):
+            form = getattr(covariance, "shape", type(covariance).__name__)
+            what = f"covariance is {form}, not (H, W, 3) numbers"
+            raise InputError(what, f"{map_.name}: map", "mend it")
+        xx, xy, yy = np.moveaxis(covariance[map_.valid & np.isfinite(covariance).all(-1)], -1, 0)
+        if not ((xx > 0) & (yy > 0) & (xy * xy <= xx * yy)).all():
+            what = "covariance is not positive somewhere"
+            raise InputError(what, f"{map_.name}: map", "give variances above zero")
     if weight is None:
         return
     if not _is_numbers(weight) or weight.shape != q.shape[:2]:

@@ -57,4 +57,5 @@ def test_a_stretched_grid_keeps_its_nodes(llvm: str) -> None:
 
 def test_other_patterns_have_no_grid(llvm: str) -> None:
     """Oracle: None for the plain grid."""
-    assert coded_grid(load_scene("sheet", **SMALL)) is None
+    plain = load_scene("sheet", **SMALL, pattern="pattern:grid")
+    assert coded_grid(plain) is None

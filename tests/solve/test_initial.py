@@ -12,6 +12,7 @@ from mitsuba_endo.solve.frames.initial import (
     observations,
     pixel_angle,
     smooth_samples,
+    whitening,
 )
 from mitsuba_endo.solve.surfaces.lattice import lattice_over
 from tests.rigs import lopsided_camera
@@ -29,6 +30,27 @@ def test_observations_keep_pixels_rays_and_coordinates_together():
     np.testing.assert_allclose(rig.camera.project(frame.rays), frame.pixels, atol=1e-6)
     x, y = frame.pixels.T
     np.testing.assert_allclose(frame.q.T, rig.q[y, x], atol=1e-4)
+
+
+def test_whitening_is_the_inverse_of_the_covariance():
+    """Oracle: NumPy's inverse of each matrix over the mean of its variances, by the weight."""
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(6, 8, 2, 2))
+    full = root @ np.swapaxes(root, -1, -2) + 0.05 * np.eye(2)
+    covariance = np.stack([full[..., 0, 0], full[..., 0, 1], full[..., 1, 1]], -1)
+    covariance[0, 0] = np.nan  # nothing known: alike in both
+    weight = rng.uniform(0.1, 1, (6, 8)).astype(np.float32)
+    map_ = CorrespondenceMap(
+        np.zeros((6, 8, 2), np.float32), "a", weight, covariance.astype(np.float32)
+    )
+    used = np.ones((6, 8), bool)
+    W = whitening(map_, used)
+    assert W is not None
+    found = np.einsum("kin,kjn->nij", W, W)
+    mean = np.trace(full, axis1=-2, axis2=-1)[..., None, None] / 2
+    expected = weight[..., None, None] * np.linalg.inv(full / mean)
+    expected[0, 0] = weight[0, 0] * np.eye(2)
+    np.testing.assert_allclose(found, expected.reshape(-1, 2, 2), rtol=1e-4)
 
 
 class TestCellSize:

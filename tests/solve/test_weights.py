@@ -78,3 +78,40 @@ def test_frames_keep_their_ratio():
     assert second.weight is not None
     np.testing.assert_allclose(first.weight[first.valid], 2 / 3, rtol=1e-6)
     np.testing.assert_allclose(second.weight[second.valid], 4 / 3, rtol=1e-6)
+
+
+def slanted(seed: int) -> CorrespondenceMap:
+    """A map whose errors are ten times larger along an axis that turns over the image."""
+    map_ = map_of(small_rig("pinhole"))
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, np.pi, map_.q.shape[1])[None, :] + np.zeros(map_.q.shape[:2])
+    long = np.stack([np.cos(angle), np.sin(angle)], -1)
+    across = np.stack([-np.sin(angle), np.cos(angle)], -1)
+    error = HIGH * rng.standard_normal(map_.q.shape[:2])[..., None] * long
+    error += HIGH / 10 * rng.standard_normal(map_.q.shape[:2])[..., None] * across
+    full = HIGH**2 * (long[..., :, None] * long[..., None, :])
+    full += (HIGH / 10) ** 2 * (across[..., :, None] * across[..., None, :])
+    covariance = np.stack([full[..., 0, 0], full[..., 0, 1], full[..., 1, 1]], -1)
+    q = (map_.q + error).astype(np.float32)
+    return CorrespondenceMap(q, map_.name, covariance=covariance.astype(np.float32))
+
+
+@pytest.mark.usefixtures("llvm")
+def test_covariances_sharpen_the_calibration_and_its_intervals():
+    """Oracle: the true focal length; an axis that is known well counts as such."""
+    rig = small_rig("pinhole")
+    errors, stds, plain = [], [], []
+    for seed in range(6):
+        map_ = slanted(seed)
+        focal = calibrate([map_], rig_file(rig), FORMAL).solution.projector.focal
+        blind = replace(map_, covariance=None)
+        without = calibrate([blind], rig_file(rig), FORMAL).solution.projector.focal
+        assert isinstance(focal.value, float)
+        assert isinstance(focal.std, float)
+        assert isinstance(without.value, float)
+        errors.append(focal.value - rig.projector.focal)
+        stds.append(focal.std)
+        plain.append(without.value - rig.projector.focal)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.6 * np.sqrt(np.mean(np.square(plain)))
+    assert 0.4 < np.sqrt(np.mean((np.array(errors) / stds) ** 2)) < 1.8
+    assert max(stds) < 0.02 * rig.projector.focal

@@ -13,6 +13,8 @@ PER_VERTEX = 9
 """Observations per surface vertex: cells of three pixels where every pixel is decoded."""
 MAX_VERTICES = 12_000
 """Of the part that one frame sees; finer surfaces cost time and hardly any detail."""
+THINNEST = 1e-3
+"""Variance along one axis, of the mean of both, below which a coordinate is not believed."""
 _BLOCK = 8
 """Side, pixels, of the blocks in which the area covered by observations is counted."""
 
@@ -23,8 +25,29 @@ def observations(
     """Collect the correspondences ``used`` (H, W) of a map."""
     y, x = np.nonzero(used)
     pixels = np.stack([x, y], -1, dtype=np.int32)
-    weight = None if map_.weight is None else np.sqrt(map_.weight[used].astype(np.float64))
-    return Observations(map_.name, camera, map_.q[used].T.astype(np.float64), pixels, weight)
+    q = map_.q[used].T.astype(np.float64)
+    return Observations(map_.name, camera, q, pixels, whitening(map_, used))
+
+
+def whitening(map_: CorrespondenceMap, used: NDArray[np.bool_]) -> NDArray[np.float64] | None:
+    """Return W of the correspondences ``used``, see :attr:`Observations.whitening`.
+
+    The weight says how well a coordinate is known altogether, the covariance how its error lies:
+    with the mean of its two variances one, W = sqrt(weight) L^-1, covariance = L L^T.
+    """
+    if map_.covariance is None:
+        return None if map_.weight is None else np.sqrt(map_.weight[used].astype(np.float64))
+    xx, xy, yy = map_.covariance[used].T.astype(np.float64)
+    mean = (xx + yy) / 2
+    known = np.isfinite(mean + xy)
+    xx, xy, yy = (
+        np.where(known, part / mean, alike) for part, alike in ((xx, 1.0), (xy, 0.0), (yy, 1.0))
+    )
+    root = np.sqrt(np.maximum(xx, THINNEST))
+    lower = np.sqrt(np.maximum(yy - (xy / root) ** 2, THINNEST))
+    # Inverse of [[root, 0], [xy / root, lower]].
+    W = np.array([[1 / root, np.zeros_like(root)], [-xy / (root**2 * lower), 1 / lower]])
+    return W if map_.weight is None else W * np.sqrt(map_.weight[used].astype(np.float64))
 
 
 def cell_size(frame: Observations, camera: CameraModel, cell_px: float | None) -> float:
