@@ -26,6 +26,7 @@ class Kind(StrEnum):
     ROS = "camera files of ROS"
     SAMPLE = "a sample of a dataset"
     SCENE = "a Mitsuba scene"
+    SEQUENCE = "a tracked sequence"
     VIEWS = "views for training"
 
 

@@ -17,6 +17,7 @@ from .patterns import patterns
 from .refine import refine
 from .render import render
 from .report import report
+from .sequence import sequence
 from .view import view
 
 app = typer.Typer(
@@ -34,6 +35,7 @@ COMMANDS = (
     decode_stack,
     refine,
     calibrate,
+    sequence,
     evaluate,
     dataset,
     report,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import atomic_path
@@ -20,8 +21,17 @@ MODES = "surface_modes.npz"
 """The surfaces' modes, by the names of the surfaces' files; beside them."""
 
 
-def save_surface(path: str | Path, surface: SurfaceEstimate) -> None:
+def save_surface(
+    path: str | Path,
+    surface: SurfaceEstimate,
+    further: dict[str, NDArray[np.float32]] | None = None,
+) -> None:
     """Write a binary PLY with float32 positions and, where given, ``std_0`` for each vertex.
+
+    Args:
+        path: the file.
+        surface: what to write.
+        further: more numbers (V,) for each vertex, by the names of their properties.
 
     Raises:
         InputError: the file cannot be written.
@@ -29,6 +39,8 @@ def save_surface(path: str | Path, surface: SurfaceEstimate) -> None:
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     if surface.std is not None:
         mesh.vertex_attributes[STD_PROPERTY] = surface.std.astype(np.float32)
+    for name, values in (further or {}).items():
+        mesh.vertex_attributes[name] = values
     data: Any = mesh.export(file_type="ply", vertex_normal=False)
     with atomic_path(path) as aside:
         aside.write_bytes(data)

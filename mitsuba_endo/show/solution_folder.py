@@ -91,7 +91,7 @@ def write_solution_folder(
         for name, frame in zip(observed_names(names), calibration.frames, strict=True):
             save_observed(folder / name, frame)
         if rig is not None:
-            _save_rig(folder / "rig.yaml", rig)
+            save_rig(folder / "rig.yaml", rig)
         figures.save_figure(folder / "overview.png", figures.overview_figure(calibration, view))
         shown = replace(calibration, solution=solution)
         save_report(folder / REPORT, [(Path(path).name, shown)], [view])
@@ -116,7 +116,8 @@ def save_trace(path: str | Path, trace: list[TraceRow]) -> None:
         writer.writerows(astuple(row) for row in trace)
 
 
-def _save_rig(path: Path, rig: Rig) -> None:
+def save_rig(path: Path, rig: Rig) -> None:
+    """Write a rig with all defaults filled in."""
     with atomic_path(path) as aside:
         text = yaml.safe_dump(rig.model_dump(mode="json"), sort_keys=False)
         aside.write_text(text, encoding="utf-8")

@@ -54,8 +54,18 @@ def drift(rig: Rig, layout: Layout) -> DriftTerm | None:
     Raises:
         InputError: spreads in mm without a known baseline.
     """
+    spread = None if layout.frames < 2 else step_spread(rig)
+    return None if spread is None else DriftTerm(layout, spread)
+
+
+def step_spread(rig: Rig) -> NDArray[np.float64] | None:
+    """Return the spread (6,) of a step as in :class:`DriftTerm`, or None where none is given.
+
+    Raises:
+        InputError: spreads in mm without a known baseline.
+    """
     drift = rig.drift
-    if drift is None or layout.frames < 2:
+    if drift is None:
         return None
     lengths = [drift.lateral_mm, drift.lateral_mm, drift.insertion_mm]
     baseline = rig.scale.baseline
@@ -65,8 +75,7 @@ def drift(rig: Rig, layout: Layout) -> DriftTerm | None:
             "give scale.baseline or spreads in degrees only",
         )  # fmt: skip
     angles = [drift.tilt_deg, drift.tilt_deg, drift.roll_deg]
-    spread = np.array(
+    return np.array(
         [np.inf if s is None else np.radians(s) for s in angles]
         + [np.inf if s is None or baseline is None else s / baseline for s in lengths]
     )
-    return DriftTerm(layout, spread)

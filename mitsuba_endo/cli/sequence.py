@@ -1,0 +1,142 @@
+"""``mitsuba-endo sequence``: from a video to poses of all frames and one surface."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .calibrate import Pattern
+from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
+from .decode import Refine
+
+if TYPE_CHECKING:
+    from ..records.trajectory import FrameRow
+    from ..sequence.outcome import SequenceResult
+
+Frames = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="VIDEO_OR_FOLDER_OR_MAP",
+        help="A video or a folder of images of the coded grid, or correspondence maps, in order.",
+    ),
+]
+RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: what is known and what is not.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]
+First = Annotated[int, typer.Option("--start", min=0, help="First frame to use, from 0.")]
+End = Annotated[int | None, typer.Option(min=1, help="Frame to stop before; all, if not given.")]
+Stride = Annotated[int, typer.Option(min=1, help="Use every so many frames.")]
+Voxel = Annotated[
+    float | None,
+    typer.Option(min=1e-6, help="Side of the map's voxels, mm; chosen, if not given."),
+]
+
+
+def sequence(
+    frames: Frames,
+    rig: RigFile,
+    out: Out,
+    start: First = 0,
+    end: End = None,
+    stride: Stride = 1,
+    voxel: Voxel = None,
+    pattern: Pattern = None,
+    refine: Refine = True,
+    quiet: Quiet = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Track camera and projector through a video, and fuse what all frames see into one surface.
+
+    The first frames are calibrated; every further one is placed against the map that grows from
+    them. A frame that fits nowhere is lost, and named. Ctrl-C writes what there is.
+    """
+    with session(quiet, as_json, debug) as output:
+        from ..folder_mark import Kind
+        from ..outputs import prepare_folder
+        from ..records.rig import read_rig
+        from ..sequence.inputs import Chosen, frames_of
+        from ..sequence.options import SequenceOptions
+        from ..show.sequence_folder import write_sequence_folder
+
+        prepare_folder(out, Kind.SEQUENCE, [*frames, rig])
+        record, notes = read_rig(rig)
+        output.print(*notes) if notes else None
+        chosen = Chosen(start, end, stride)
+        incoming, count = frames_of(frames, record, chosen, pattern, refine=refine)
+        with _progress(output, count) as (say, on_frame):
+            say("Starting Mitsuba")
+            from .. import backend
+
+            backend.use()
+            from ..sequence.outcome import outcome_of
+            from ..sequence.run import run_sequence
+
+            say("Calibrating the first frames")
+            options = SequenceOptions(voxel=voxel)
+            recorded = run_sequence(incoming, record, options, on_frame)
+            say("Writing the folder")
+            result = outcome_of(recorded, options.vertices)
+            write_sequence_folder(out, result)
+        _report(result, out, output)
+        raise typer.Exit(_exit_code(result))
+
+
+@contextlib.contextmanager
+def _progress(
+    output: Session, count: int | None
+) -> Iterator[tuple[Callable[[str], None], Callable[["FrameRow"], None]]]:
+    """Yield what tells of a step, and of a frame: a bar in a terminal, elsewhere a line each."""
+    with output.progress("Reading") as advance:
+        lines = not (output.quiet or sys.stderr.isatty())
+        done = 0.0
+
+        def say(step: str) -> None:
+            advance(done, step)
+            if lines:
+                print(step, file=sys.stderr, flush=True)
+
+        def on_frame(row: "FrameRow") -> None:
+            nonlocal done
+            done = 0.0 if count is None else (row.number + 1) / count
+            line = frame_line(row, count)
+            advance(done, line)
+            if lines:
+                print(line, file=sys.stderr, flush=True)
+
+        yield say, on_frame
+
+
+def frame_line(row: "FrameRow", count: int | None) -> str:
+    """Return what is said of a frame while the sequence runs."""
+    of = "" if count is None else f" of {count}"
+    head = f"frame {row.number + 1}{of} ({row.name})"
+    if row.lost:
+        return f"{head}: lost, {row.lost}"
+    known = "begins a map" if row.overlap is None else f"{100 * row.overlap:.0f} % known before"
+    return f"{head}: {known}"
+
+
+def _report(result: "SequenceResult", out: Path, output: Session) -> None:
+    solution = result.solution
+    output.print(*solution.verdict, *[f"warning: {w}" for w in solution.warnings])
+    shown = f"; pictures of keyframes in {out}/keyframes/report.html" if result.keyframes else ""
+    output.print(f"The surface is {out}/mesh.ply, the poses are {out}/frames.csv{shown}.")
+    output.summary({
+        "folder": str(out),
+        "frames": len(result.rows),
+        "lost": [{"name": row.name, "reason": row.lost} for row in result.lost],
+        "parts": len(result.surfaces),
+        "solution": solution.model_dump(mode="json", by_alias=True),
+    })  # fmt: skip
+
+
+def _exit_code(result: "SequenceResult") -> int:
+    """130 if the user stopped it, 1 if it falls into parts, else 0."""
+    from ..records.solution import Outcome
+
+    if result.solution.outcome is Outcome.INTERRUPTED:
+        return EXIT_INTERRUPTED
+    return EXIT_FAULT if len(result.surfaces) > 1 else 0

@@ -1,0 +1,151 @@
+"""What a frame's correspondences say of its poses, linearised.
+
+A correspondence is two numbers. Across its epipolar line it tells of the projector's pose alone;
+along it, of the range. With the map S held, the residual R(S, C, P) - q is whitened in these two
+directions: the epipolar residual, and the distance of the triangulated point to the map. Where the
+map ends the second is missing, and the first still counts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from ..fusion import Volume
+from ..fusion.interpolate import interpolate
+from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
+from ..start.epipolar import residuals
+from ..start.triangulate import ranges
+from ..start.vectors import cross, dot
+from .view import PixelSample
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+_STEP = 1e-6
+"""Of numerical derivatives of the projection, relative to the distance."""
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where camera and projector of one frame are; lengths are the map's."""
+
+    world_from_camera: RigidTransform
+    projector_from_camera: RigidTransform
+
+    def moved(self, step: Floats) -> "Poses":
+        """Return poses after a step (12,): the projector's six, the camera's in its own axes."""
+        turned = RigidTransform.identity().perturbed(step[6:])
+        return Poses(
+            orthonormal(self.world_from_camera @ turned),
+            orthonormal(self.projector_from_camera.perturbed(step[:6])),
+        )
+
+
+def orthonormal(pose: RigidTransform) -> RigidTransform:
+    """Return a pose without the rounding errors of its rotation.
+
+    A prediction of constant velocity multiplies them from frame to frame.
+    """
+    return RigidTransform(Rotation.from_matrix(pose.R).as_matrix(), pose.t)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulated:
+    """Points on the camera's rays, and how they depend on the projector's pose."""
+
+    good: Bools
+    """(N,) before both devices."""
+    range: Floats
+    """(N,) along the unit ray."""
+    pixels_per_length: Floats
+    """(N,) how far the coordinate moves with the range: pattern pixels a unit of length."""
+    across: Floats
+    """(N,) epipolar residual, pattern pixels."""
+    by_pose: Floats
+    """(7, N) derivative of minus ``across``: by the projector's pose (6) and the log of its focal
+    length."""
+    range_by_pose: Floats
+    """(6, N) derivative of ``range``."""
+
+
+def triangulate(
+    sample: PixelSample, projector: ProjectorModel, pose: RigidTransform
+) -> Triangulated:
+    """Triangulate correspondences under a pose, projector_from_camera."""
+    at = residuals(pose, sample.rays, sample.bearings)
+    along, lit, _ = ranges(pose, sample.bearings, at)
+    good = np.isfinite(along) & (along > 0) & (lit > 0)
+    distance = np.where(good, along, 1.0)
+    turned = at.turned * distance
+    Y = turned + pose.t[:, None]
+    good &= Y[2] > 0
+    Y = np.where(good, Y, np.array([[0.0], [0.0], [1.0]]))
+    q, gradient = _projection(projector, Y)
+    by_range = np.einsum("ijn,jn->in", gradient, at.turned)
+    slope = np.sqrt((by_range**2).sum(0)) + 1e-12
+    tangent = by_range / slope
+    normal = np.stack([-tangent[1], tangent[0]])
+    centre = np.array(projector.centre, float)[:, None]
+    # d q / d (turn, shift) = G [-(R X) x, 1]: its rows are (R X) x g and g.
+    rows = []
+    for direction in (normal, tangent):
+        g = np.einsum("in,ijn->jn", direction, gradient)
+        rows.append(np.concatenate([cross(turned, g), g]))
+    focal = dot2(normal, q - centre)
+    return Triangulated(
+        good, distance, slope, dot2(normal, sample.q - q),
+        np.concatenate([rows[0], focal[None]]), -rows[1] / slope,
+    )  # fmt: skip
+
+
+def dot2(a: Floats, b: Floats) -> Floats:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _projection(projector: ProjectorModel, Y: Floats) -> tuple[Floats, Floats]:
+    """Return coordinates (2, N) of directions Y (3, N), and their derivatives (2, 3, N)."""
+    h = _STEP * np.sqrt(dot(Y, Y))
+    gradient = np.empty((2, 3, Y.shape[1]))
+    for axis in range(3):
+        ends = []
+        for sign in (1, -1):
+            moved = Y.copy()
+            moved[axis] += sign * h
+            ends.append(np.stack(projector.project_xyz(*moved)))
+        gradient[:, axis] = (ends[0] - ends[1]) / (2 * h)
+    return np.stack(projector.project_xyz(*Y)), gradient
+
+
+@dataclass(frozen=True, eq=False)
+class AgainstMap:
+    """Distances of triangulated points to the map."""
+
+    known: Bools
+    """(N,) where the map is known."""
+    distance: Floats
+    """(N,) signed, along the map's normal."""
+    cosine: Floats
+    """(N,) of the angle between ray and normal, with sign."""
+    by_poses: Floats
+    """(12, N) derivative of ``distance``."""
+
+
+def against_map(
+    sample: PixelSample, found: Triangulated, camera: RigidTransform, volume: Volume
+) -> AgainstMap:
+    """Compare triangulated points with the map, the camera at world_from_camera."""
+    points = sample.rays * found.range
+    at = interpolate(volume, camera.apply(points.T))
+    normal = camera.R.T @ at.gradient.T
+    length = np.sqrt(dot(normal, normal))
+    known = at.known & found.good & (length > 0.3)
+    normal = normal / np.where(length > 0, length, 1.0)
+    cosine = dot(normal, sample.rays)
+    own = np.concatenate([cross(points, normal), normal])
+    return AgainstMap(
+        known, at.distance / np.where(known, length, 1.0), cosine,
+        np.concatenate([cosine * found.range_by_pose, own]),
+    )  # fmt: skip

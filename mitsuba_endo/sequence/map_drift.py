@@ -1,0 +1,76 @@
+"""How far a map that grows from frame to frame may have drifted from where it began.
+
+Each frame is placed on what some n frames before it made, and adds a share of 1 / n to what later
+frames are placed on. So its own error enters the map's by 1 / n, and errors of different frames
+are independent: a random walk, of which every fused frame is a step. The first frame made the map
+alone: its error counts whole, and is as large as that of the next one.
+
+A map that was made with a wrong pose of the projector is bent so that later frames find the same
+wrong pose. So the walk is one of both poses; the error of the baseline's length is one of scale,
+which the way of the camera multiplies.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.transforms import RigidTransform
+from ..start.vectors import skew
+from .linearise import Poses
+
+Floats = NDArray[np.float64]
+
+
+class MapDrift:
+    """Covariance of what the newest piece of the map makes frames' poses err by."""
+
+    def __init__(self) -> None:
+        self._covariance: Floats | None = None
+        """(12, 12): step of the projector, rotation about the world's origin, shift there."""
+        self._places = [np.zeros(3)]
+        """Of the cameras of fused frames."""
+
+    def fused(self, poses: Poses, own: Floats, reach: float) -> None:
+        """Take a frame that enters the map.
+
+        Args:
+            poses: where it was placed.
+            own: (12, 12) covariance of its step against the map, see :func:`in_world`.
+            reach: how far, the map's unit, cameras may be apart that see the same surface.
+        """
+        place = poses.world_from_camera.t
+        near = np.linalg.norm(np.array(self._places) - place, axis=1) < reach
+        to_origin = _felt_at(-place)
+        step = to_origin @ own @ to_origin.T
+        before = step if self._covariance is None else self._covariance
+        way = _scaled(place - self._places[-1], poses.projector_from_camera)
+        self._covariance = way @ before @ way.T + step / (near.sum() + 1) ** 2
+        self._places.append(place)
+
+    def at(self, world_from_camera: RigidTransform) -> Floats:
+        """Return the covariance (12, 12) of the steps of projector and camera of a frame there."""
+        if self._covariance is None:
+            return np.zeros((12, 12))
+        moved = _felt_at(world_from_camera.t)
+        return moved @ self._covariance @ moved.T
+
+
+def in_world(covariance: Floats, world_from_camera: RigidTransform) -> Floats:
+    """Turn the covariance (12, 12) of :meth:`Poses.moved`'s step into the world's axes."""
+    turn = np.eye(12)
+    turn[6:, 6:] = np.kron(np.eye(2), world_from_camera.R)
+    return turn @ covariance @ turn.T
+
+
+def _felt_at(t: Floats) -> Floats:
+    """Return (12, 12): a rotation about the origin and a shift there, as felt at ``t``."""
+    out = np.eye(12)
+    out[9:, 6:9] = -skew(t)
+    return out
+
+
+def _scaled(way: Floats, projector_from_camera: RigidTransform) -> Floats:
+    """Return (12, 12): an error of the baseline's length shifts what lies a ``way`` on."""
+    t = projector_from_camera.t
+    out = np.eye(12)
+    out[9:, 3:6] = np.outer(way, t) / (t @ t)
+    return out

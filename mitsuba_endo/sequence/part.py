@@ -1,0 +1,181 @@
+"""One connected part of a sequence: a map, and the frames that are tracked against it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fusion import Volume
+from ..geometry.cameras import CameraModel
+from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
+from ..start.range_image import RangeImage
+from .gate import fault
+from .keyframes import Keyframes
+from .linearise import Poses, orthonormal
+from .map_drift import MapDrift, in_world
+from .placement import Placement, Prior, place
+from .projector_prior import ProjectorDrift
+from .range_images import Ranged, ranged
+from .shared_errors import SharedErrors
+from .view import ThinnedMap
+
+Floats = NDArray[np.float64]
+
+LEAST_OVERLAP = 0.8
+"""Share of a frame that the map knew: with less, the frame is fused at once."""
+LONGEST_PREDICTION = 10
+"""Frames over which the last motion is thought to go on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What does not change along a sequence."""
+
+    camera: CameraModel
+    """Of the thinned images."""
+    step: int
+    """Of the thinning."""
+    projector: ProjectorModel
+    drift: ProjectorDrift
+    voxel: float
+    fuse_every: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A frame that was placed."""
+
+    poses: Poses
+    covariance: Floats
+    """(12, 12) of :meth:`RigidTransform.perturbed`'s steps of projector_from_camera and of
+    world_from_camera: what the frame's pixels leave open, and how far the map may have drifted."""
+    placement: Placement | None
+    """None for the frame with which the map began."""
+    keyframe: bool
+
+
+class Part:
+    """The map grows by what :meth:`track` places; its world is the first frame's camera."""
+
+    def __init__(
+        self,
+        setup: Setup,
+        number: int,
+        view: ThinnedMap,
+        projector_pose: RigidTransform,
+        noise: float,
+    ) -> None:
+        """Begin a map with one frame.
+
+        Args:
+            setup: what all frames share.
+            number: of the frame.
+            view: what it saw.
+            projector_pose: projector_from_camera, whose translation gives the unit of length.
+            noise: of a coordinate, pattern pixels.
+        """
+        self.setup, self.noise = setup, noise
+        self.volume, self.keyframes = Volume(setup.voxel), Keyframes()
+        self._spread = SharedErrors()
+        self.fused = 0
+        self._rng = np.random.default_rng(setup.seed)
+        self._before: tuple[int, Poses] | None = None
+        self._last = number, Poses(RigidTransform.identity(), projector_pose)
+        self._covariance = np.zeros((6, 6))
+        self._drift = MapDrift()
+        self._fused_at, self._searches = number, 0
+        seen = ranged(view, self._last[1], setup.projector, noise)
+        self._fuse(number, seen)
+        self._keep(number, self._last[1], seen)
+        self.first = Tracked(self._last[1], np.zeros((12, 12)), None, keyframe=True)
+
+    def track(self, number: int, view: ThinnedMap) -> Tracked | str:
+        """Place a frame against the map and add to the map what it saw; or say why not."""
+        sample = view.sample(self.setup.projector)
+        since = number - self._last[0]
+        prior = self.setup.drift.prior(self._last[1].projector_from_camera, self._covariance, since)
+        reason = ""
+        for starts in self._starts(view, number, prior):
+            placed = [
+                place(sample, start, self.setup.projector, self.volume, prior, self.noise)
+                for start in starts
+            ]
+            sound = [found for found in placed if not fault(found)]
+            if sound:
+                return self._accepted(number, view, min(sound, key=lambda found: found.misfit))
+            reason = fault(placed[-1]) if placed else reason
+        return reason
+
+    def _starts(self, view: ThinnedMap, number: int, prior: Prior) -> Iterator[list[Poses]]:
+        """Yield poses to begin with, likely ones first; of those yielded together the best counts.
+
+        The motion may go on. After a gap nothing says so, and where keyframes place the frame
+        counts too.
+        """
+        last = self._last[1]
+        since = number - self._last[0]
+        going_on = self._predicted(since)
+        if since == 1:
+            yield going_on
+            yield [last]
+        else:
+            yield [*going_on, last]
+        image, projector_pose = self._alone(view, prior)
+        near, turn = last.world_from_camera, self._searches
+        self._searches += 1
+        yield [
+            Poses(orthonormal(pose), projector_pose)
+            for pose in self.keyframes.find(image, near, turn, self._rng)
+        ]
+
+    def _predicted(self, since: int) -> list[Poses]:
+        """Return the pose ``since`` frames on if the last motion goes on, if one is known."""
+        if self._before is None or since > LONGEST_PREDICTION:
+            return []
+        pose = self._last[1].world_from_camera
+        motion = self._before[1].world_from_camera.inverse() @ pose
+        for _ in range(since):
+            pose = pose @ motion
+        return [Poses(orthonormal(pose), self._last[1].projector_from_camera)]
+
+    def _alone(self, view: ThinnedMap, prior: Prior) -> tuple[RangeImage, RigidTransform]:
+        """Return a frame's range image from its own epipolar lines, and the projector's pose."""
+        sample, nowhere = view.sample(self.setup.projector), Volume(self.setup.voxel)
+        start = Poses(RigidTransform.identity(), prior.mean)
+        found = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
+        seen = ranged(view, found.poses, self.setup.projector, found.noise)
+        return _image(seen), found.poses.projector_from_camera
+
+    def _accepted(self, number: int, view: ThinnedMap, found: Placement) -> Tracked:
+        """Take over a placement: next frames begin there, and the map may grow."""
+        setup, poses = self.setup, found.poses
+        own = in_world(self._spread.widened(found), poses.world_from_camera)
+        keyframe = self.keyframes.wanted(poses, found.overlap)
+        due = number - self._fused_at >= setup.fuse_every or found.overlap < LEAST_OVERLAP
+        if keyframe or due:
+            seen = ranged(view, poses, setup.projector, found.noise)
+            if keyframe:
+                self._keep(number, poses, seen)
+            self._fuse(number, seen)
+            self._drift.fused(poses, own, self.keyframes.kept[0].pyramid.unit)
+        consecutive = number == self._last[0] + 1
+        self._before = self._last if consecutive else None
+        self._last, self.noise, self._searches = (number, poses), found.noise, 0
+        self._covariance = own[:6, :6]
+        return Tracked(poses, own + self._drift.at(poses.world_from_camera), found, keyframe)
+
+    def _fuse(self, number: int, seen: Ranged) -> None:
+        self.volume.integrate(seen.frame)
+        self._fused_at = number
+        self.fused += 1
+
+    def _keep(self, number: int, poses: Poses, seen: Ranged) -> None:
+        self.keyframes.add(number, poses, _image(seen))
+
+
+def _image(seen: Ranged) -> RangeImage:
+    camera = seen.frame.camera
+    return RangeImage(camera.grid_rays, seen.frame.range, camera)

@@ -1,0 +1,186 @@
+"""Placing one frame: camera and projector by Gauss-Newton against the map."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fusion import Volume
+from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
+from ..solve.costs.drift import step_between
+from .linearise import AgainstMap, Poses, Triangulated, against_map, triangulate
+from .view import PixelSample
+
+Floats = NDArray[np.float64]
+
+STEPS = 30
+"""At most; six are the rule, and more where motion was not as predicted."""
+SETTLED = 1e-4
+"""Largest component of a step, radians or relative to the range, that ends the iteration: a
+twentieth of what noise moves a pose by."""
+WIDEST = 8.0
+"""The loss begins so many times wider and is halved from step to step: predictions are off by
+more than noise."""
+MAP_NOISE = 0.1
+"""Standard deviation of the map where it is known, voxels."""
+FAR = 3.0
+"""Standard deviations beyond which a correspondence does not agree."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the projector's pose before the frame."""
+
+    mean: RigidTransform
+    """projector_from_camera."""
+    information: Floats
+    """(6, 6) of the step from the mean: rotation vector and translation in the projector's axes."""
+
+    def pull(self, poses: Poses) -> Floats:
+        """Return how far (6,) the projector is from the mean."""
+        return step_between(self.mean, poses.projector_from_camera)
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where a frame was put, and how well it fits there."""
+
+    poses: Poses
+    found: Triangulated
+    """The sample's points, there."""
+    noise: float
+    """Of a coordinate, across its epipolar line, pattern pixels: robust standard deviation."""
+    on_lines: float
+    """Share of the correspondences within :data:`FAR` standard deviations of their lines."""
+    overlap: float
+    """Share of the correspondences where the map is known."""
+    agreement: float
+    """Share of these within :data:`FAR` standard deviations of the map."""
+    misfit: float
+    """Robust standard deviation of the distances to the map over that expected of noise."""
+    settled: bool
+    """Whether the last step was below noise."""
+    covariance: Floats
+    """(12, 12) of :meth:`Poses.moved`'s step, as if errors of pixels were independent."""
+    clustered: Floats
+    """(12, 12) of the same from how blocks of the image disagree; of low rank, for means over
+    frames."""
+
+
+def place(
+    sample: PixelSample,
+    start: Poses,
+    projector: ProjectorModel,
+    volume: Volume,
+    prior: Prior,
+    noise: float,
+) -> Placement:
+    """Move camera and projector from a start to where correspondences and map agree.
+
+    Args:
+        sample: of the frame.
+        start: poses to begin with, the map within reach.
+        projector: with its focal length.
+        volume: the map. Where it knows nothing, epipolar lines alone place the projector, and the
+            camera stays.
+        prior: on the projector.
+        noise: of a coordinate, pattern pixels, as far as it is known; estimated anew.
+    """
+    poses, widened, settled = start, WIDEST, False
+    found = triangulate(sample, projector, poses.projector_from_camera)
+    for _ in range(STEPS):
+        seen = against_map(sample, found, poses.world_from_camera, volume)
+        noise = noise_of(found, noise)
+        A, b = _equations(found, seen, noise, volume.voxel, widened)
+        A[:6, :6] += prior.information
+        b[:6] -= prior.information @ prior.pull(poses)
+        step = np.linalg.solve(A, b).astype(np.float64)
+        poses = poses.moved(step)
+        found = triangulate(sample, projector, poses.projector_from_camera)
+        settled = widened == 1 and _relative(step, found) < SETTLED
+        if settled:
+            break
+        widened = max(1.0, widened / 2)
+    seen = against_map(sample, found, poses.world_from_camera, volume)
+    A, _ = _equations(found, seen, noise, volume.voxel, 1.0)
+    A[:6, :6] += prior.information
+    covariance = np.linalg.inv(A).astype(np.float64)
+    scatter = _scatter(sample.block, found, seen, noise, volume.voxel)
+    clustered = covariance @ scatter @ covariance
+    return _judged(found, seen, poses, noise, volume.voxel, settled, (covariance, clustered))
+
+
+def _relative(step: Floats, found: Triangulated) -> float:
+    """Return the largest component of a step, radians or parts of the typical range."""
+    size = float(np.median(found.range[found.good])) if found.good.any() else 1.0
+    return float(np.abs(step / np.tile([1, 1, 1, size, size, size], 2)).max())
+
+
+def _judged(
+    found: Triangulated, seen: AgainstMap, poses: Poses, noise: float, voxel: float,
+    settled: bool, known: tuple[Floats, Floats],
+) -> Placement:  # fmt: skip
+    off = np.abs(seen.distance / deviation(found, seen, noise, voxel))[seen.known]
+    near = found.good & (np.abs(found.across) < FAR * noise)
+    return Placement(
+        poses, found, noise, float(near.mean()), float(seen.known.mean()),
+        float((off < FAR).mean()) if len(off) else 0.0,
+        1.4826 * float(np.median(off)) if len(off) else np.inf, settled, *known,
+    )  # fmt: skip
+
+
+def noise_of(found: Triangulated, otherwise: float) -> float:
+    """Return the robust standard deviation of the epipolar residuals, pattern pixels."""
+    if not found.good.any():
+        return otherwise
+    return max(1.4826 * float(np.median(np.abs(found.across[found.good]))), 1e-3)
+
+
+def deviation(found: Triangulated, seen: AgainstMap, noise: float, voxel: float) -> Floats:
+    """Return the standard deviations (N,) of distances to the map."""
+    along = np.abs(seen.cosine) * noise / found.pixels_per_length
+    return np.hypot(along, MAP_NOISE * voxel)
+
+
+def _equations(
+    found: Triangulated, seen: AgainstMap, noise: float, voxel: float, widened: float
+) -> tuple[Floats, Floats]:
+    """Return A (12, 12) and b (12,) of a step under Geman and McClure's loss."""
+    (across, on_line, r), (along, on_map, d) = _rows(found, seen, noise, voxel, widened)
+    A, b = np.zeros((12, 12)), np.zeros(12)
+    A[:6, :6] = (across * on_line) @ across.T
+    b[:6] = across @ (on_line * r)
+    A += (along * on_map) @ along.T
+    b += along @ (on_map * d)
+    # Holds the camera where no map is known, and moves nothing else by a hundredth of its noise.
+    A[np.arange(12), np.arange(12)] += 1e-9 * np.trace(A)
+    return A, b
+
+
+def _rows(
+    found: Triangulated, seen: AgainstMap, noise: float, voxel: float, widened: float
+) -> tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]:
+    """Return derivatives, weights and residuals, across the lines (6, N) and to the map (12, N)."""
+    r = found.across / noise
+    on_line = np.where(found.good, 1 / (1 + (r / FAR) ** 2) ** 2, 0.0)
+    std = deviation(found, seen, noise, voxel)
+    d = -seen.distance / std
+    on_map = np.where(seen.known, on_line / (1 + (d / FAR / widened) ** 2) ** 2, 0.0)
+    return (found.by_pose[:6] / noise, on_line, r), (seen.by_poses / std, on_map, d)
+
+
+def _scatter(
+    block: NDArray[np.int_], found: Triangulated, seen: AgainstMap, noise: float, voxel: float
+) -> Floats:
+    """Return (12, 12) sum over blocks of g g^T, g being a block's share of b.
+
+    Between two inverses of A it is the covariance of a step whatever errors the pixels of a block
+    share (the sandwich of White and of Liang and Zeger, 1986, blocks as clusters).
+    """
+    (across, on_line, r), (along, on_map, d) = _rows(found, seen, noise, voxel, 1.0)
+    scores = along * (on_map * d)
+    scores[:6] += across * (on_line * r)
+    count = int(block.max(initial=0)) + 1
+    sums = np.stack([np.bincount(block, row, count) for row in scores])
+    return sums @ sums.T * count / max(count - 1, 1)

@@ -1,0 +1,242 @@
+"""Through a sequence, frame by frame."""
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from ..errors import InputError
+from ..geometry.cameras import CameraModel
+from ..geometry.transforms import RigidTransform
+from ..records.correspondence import CorrespondenceMap
+from ..records.rig import Rig
+from ..records.trajectory import FrameRow
+from .bootstrap import Beginning, begin, check_plan
+from .epipolar_focal import FocalSum, focal_of, told_of_focal
+from .frames import Incoming, Unread, check_size, shortage
+from .kept_maps import KeptMaps
+from .options import SequenceOptions
+from .part import Part, Tracked
+from .view import ThinnedMap, thinned, thinning, view_of
+
+LONG_LOSS = 15
+"""Frames in a row that show enough and fit nowhere, after which a new part begins."""
+
+EARLY = "it comes before the first frame that could be calibrated"
+
+OnFrame = Callable[[FrameRow], None]
+"""Called with every frame, in order, once it is placed or lost."""
+
+
+@dataclass(eq=False)
+class Recorded:
+    """What is known after some frames of a sequence."""
+
+    rig: Rig
+    rows: list[FrameRow]
+    """One a frame, in order."""
+    parts: list[Part] = field(default_factory=list)
+    """Maps that do not hang together, in the order in which they began."""
+    beginning: Beginning | None = None
+    kept: list[KeptMaps] = field(default_factory=list)
+    """Maps of some keyframes of each part."""
+    told: FocalSum = field(default_factory=FocalSum)
+    """What all placed frames told of the focal length, about the value that was held."""
+    interrupted: bool = False
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall-clock time by stage."""
+
+
+class Run:
+    """A sequence under way: frames come in by :meth:`add`."""
+
+    def __init__(self, rig: Rig, options: SequenceOptions, on_frame: OnFrame | None = None) -> None:
+        """Look at the rig.
+
+        Raises:
+            InputError: it asks for what a sequence cannot do.
+        """
+        check_plan(rig)
+        self.recorded = Recorded(rig, [])
+        self._options, self._on_frame = options, on_frame or (lambda _row: None)
+        full = rig.camera.to_model()
+        self._step = thinning(full)
+        self._camera: CameraModel = thinned(full, self._step)
+        self._waiting: list[tuple[Unread | ThinnedMap, Incoming]] = []
+        """Frames before the first ones are calibrated, and what they were made of."""
+        self._missed = 0
+        """Frames in a row that were lost although they show enough."""
+        self._names: set[str] = set()
+
+    def add(self, frame: Incoming) -> None:
+        """Take the next frame.
+
+        Raises:
+            InputError: its size is not the rig's, its name came before, or the first frames tell
+                no calibration.
+        """
+        if frame.name in self._names:
+            raise InputError("two frames have this name", frame.name, "rename one file")
+        self._names.add(frame.name)
+        view = self._viewed(frame)
+        if self.recorded.beginning is not None:
+            self._record(view, frame)
+            return
+        self._waiting.append((view, frame))
+        if sum(isinstance(v, ThinnedMap) for v, _ in self._waiting) >= self._options.first:
+            self._begin()
+
+    def end(self) -> Recorded:
+        """Return what was recorded; frames that still wait are begun with.
+
+        Raises:
+            InputError: nothing can be calibrated.
+        """
+        if self.recorded.beginning is None:
+            self._begin()
+        return self.recorded
+
+    def _viewed(self, frame: Incoming) -> Unread | ThinnedMap:
+        if isinstance(frame, Unread):
+            return frame
+        check_size(frame, self.recorded.rig)
+        view = view_of(frame, self._camera, self._step)
+        reason = shortage(view)
+        return Unread(frame.name, reason) if reason else view
+
+    def _begin(self) -> None:
+        """Calibrate the frames that wait, and record them."""
+        began = time.perf_counter()
+        views = [v for v, _ in self._waiting if isinstance(v, ThinnedMap)]
+        maps = [
+            m for v, m in self._waiting if isinstance(v, ThinnedMap) and not isinstance(m, Unread)
+        ]
+        _check_enough([v for v, _ in self._waiting])
+        beginning = begin(maps, views, self.recorded.rig, self._options)
+        self.recorded.beginning = beginning
+        self.recorded.seconds["beginning"] = time.perf_counter() - began
+        waiting, self._waiting = self._waiting, []
+        reached = False
+        for view, frame in waiting:
+            reached = reached or view is views[beginning.first]
+            early = isinstance(view, ThinnedMap) and not reached
+            self._record(Unread(view.name, EARLY) if early else view, frame)
+
+    def _record(self, view: Unread | ThinnedMap, frame: Incoming) -> None:
+        """Place a frame and keep what is known of it."""
+        began = time.perf_counter()
+        number = len(self.recorded.rows)
+        found = view.reason if isinstance(view, Unread) else self._placed(number, view)
+        part = max(len(self.recorded.parts) - 1, 0)
+        row = FrameRow(number, view.name, part=part)
+        row = replace(row, lost=found) if isinstance(found, str) else _row(row, found)
+        row = replace(row, seconds=time.perf_counter() - began)
+        if row.keyframe and isinstance(frame, CorrespondenceMap):
+            self.recorded.kept[part].offer(number, frame)
+        self.recorded.rows.append(row)
+        self._on_frame(row)
+
+    def _placed(self, number: int, view: ThinnedMap) -> Tracked | str:
+        parts, beginning = self.recorded.parts, self.recorded.beginning
+        assert beginning is not None
+        if not parts:
+            part = Part(beginning.setup, number, view, beginning.projector_pose, beginning.noise)
+            self._append(part)
+            return part.first
+        found = parts[-1].track(number, view)
+        if not isinstance(found, str):
+            self._missed = 0
+            self._tell_focal(found)
+            return found
+        self._missed += 1
+        return self._new_part(number, view) if self._missed > LONG_LOSS else found
+
+    def _tell_focal(self, found: Tracked) -> None:
+        if found.placement is not None:
+            pose, noise = found.poses.projector_from_camera, found.placement.noise
+            told = told_of_focal(found.placement.found, pose, noise)
+            self.recorded.told = self.recorded.told.plus(*told)
+
+    def _new_part(self, number: int, view: ThinnedMap) -> Tracked:
+        """Begin a new map with a frame that fits nowhere on the old one."""
+        beginning = self.recorded.beginning
+        assert beginning is not None
+        last = next(r for r in reversed(self.recorded.rows) if r.projector_from_camera is not None)
+        pose: RigidTransform | None = last.projector_from_camera
+        assert pose is not None
+        if not beginning.setup.drift.held:
+            pose = focal_of([view], beginning.setup.projector, pose, free=False).poses[0]
+        part = Part(beginning.setup, number, view, pose, self.recorded.parts[-1].noise)
+        self._append(part)
+        return part.first
+
+    def _append(self, part: Part) -> None:
+        self.recorded.parts.append(part)
+        self.recorded.kept.append(KeptMaps())
+        self._missed = 0
+
+
+def _row(row: FrameRow, found: Tracked) -> FrameRow:
+    std, placement = np.sqrt(np.diag(found.covariance)), found.placement
+    row = replace(
+        row, keyframe=found.keyframe, world_from_camera=found.poses.world_from_camera,
+        projector_from_camera=found.poses.projector_from_camera,
+    )  # fmt: skip
+    if placement is None:
+        return row
+    return replace(
+        row, projector_std=std[:6], camera_std=std[6:], noise_px=placement.noise,
+        misfit=placement.misfit, overlap=placement.overlap, agreement=placement.agreement,
+    )  # fmt: skip
+
+
+def _check_enough(waiting: list[Unread | ThinnedMap]) -> None:
+    if not waiting:
+        raise InputError("there are no frames", todo="give a video, a folder or maps")
+    first = waiting[0]
+    if len(waiting) == 1:
+        raise InputError("one frame is no sequence", first.name, "use the command calibrate")
+    if isinstance(first, Unread) and all(isinstance(v, Unread) for v in waiting):
+        raise InputError(
+            f"no frame shows enough of the pattern (the first: {first.reason})", first.name,
+            "check the pattern, light and focus",
+        )  # fmt: skip
+
+
+def run_sequence(
+    frames: Iterable[Incoming],
+    rig: Rig,
+    options: SequenceOptions | None = None,
+    on_frame: OnFrame | None = None,
+) -> Recorded:
+    """Track all frames of a sequence.
+
+    Frames are taken one by one, and nothing of them is kept but their poses and what they add to
+    the map. Ctrl-C ends the sequence after the frames that were placed.
+
+    Args:
+        frames: correspondence maps in the order in which they were taken.
+        rig: what is known.
+        options: how to go through them.
+        on_frame: called with every frame once it is placed or lost.
+
+    Returns:
+        Poses and maps, the unit of length of the rig's scale; the world is the first camera.
+
+    Raises:
+        InputError: frames or rig that cannot be used; says what to do.
+        KeyboardInterrupt: stopped before the first frames were calibrated.
+    """
+    run = Run(rig, options or SequenceOptions(), on_frame)
+    # One thread: the matrices are too small for two, which then wait for each other.
+    with threadpool_limits(1, "blas"):
+        try:
+            for frame in frames:
+                run.add(frame)
+        except KeyboardInterrupt:
+            if run.recorded.beginning is None:
+                raise
+            run.recorded.interrupted = True
+        return run.end()

@@ -1,0 +1,63 @@
+"""The folder that a sequence leaves behind."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..files import atomic_folder
+from ..folder_mark import Kind
+from ..fusion import FusedMesh
+from ..records.calibration import SurfaceEstimate
+from ..records.solution import save_solution
+from ..records.surface import save_surface
+from ..records.trajectory import save_frames, save_tum
+from ..sequence.outcome import SequenceResult, numbered
+from .solution_folder import save_rig, write_solution_folder
+
+KEYFRAMES = "keyframes"
+"""A solution folder, which ``report``, ``view``, ``evaluate`` and ``export`` read."""
+
+
+def write_sequence_folder(path: str | Path, result: SequenceResult) -> None:
+    """Write everything that a sequence found, all of it or nothing.
+
+    =========================  ====================================================================
+    mesh.ply                   the surface in the first camera's frame; ``frames_0`` says for each
+                               vertex how many fused frames measured it
+    trajectory_camera.tum      number of the frame, world_from_camera: t x y z qx qy qz qw
+    trajectory_projector.tum   likewise world_from_projector
+    frames.csv                 one line a frame: poses with deviations, fit, why it was lost
+    solution.json              focal length, verdict, lost frames, and the keyframes' poses
+    rig.yaml                   the rig with all defaults filled in
+    keyframes/                 a solution folder with the maps of some keyframes
+    =========================  ====================================================================
+
+    Where the sequence falls into parts, these are the part with the most frames; the mesh and the
+    trajectories of the others have ``_partN`` in their names.
+
+    Raises:
+        InputError: the folder holds other files or cannot be written.
+    """
+    with atomic_folder(path, Kind.SEQUENCE) as folder:
+        for part, surface in enumerate(result.surfaces):
+            suffix = "" if part == result.main else f"_part{part + 1}"
+            if surface is not None:
+                save_mesh(folder / f"mesh{suffix}.ply", surface)
+            poses = numbered(result.of_part(part))
+            save_tum(folder / f"trajectory_camera{suffix}.tum", [(n, c) for n, c, _ in poses])
+            save_tum(folder / f"trajectory_projector{suffix}.tum", [(n, p) for n, _, p in poses])
+        save_frames(folder / "frames.csv", result.rows)
+        solution = result.solution
+        if result.keyframes is not None:
+            write_solution_folder(folder / KEYFRAMES, result.keyframes, result.rig)
+            solution = solution.model_copy(update={"surface": "mesh.ply"})
+        save_solution(folder / "solution.json", solution)
+        save_rig(folder / "rig.yaml", result.rig)
+
+
+def save_mesh(path: str | Path, mesh: FusedMesh) -> None:
+    """Write a fused mesh as PLY, with the number of frames for each vertex."""
+    save_surface(
+        path, SurfaceEstimate(mesh.vertices, mesh.faces),
+        {"frames_0": mesh.frames.astype(np.float32)},
+    )  # fmt: skip
