@@ -63,7 +63,8 @@ def sequence(
 
         prepare_folder(out, Kind.SEQUENCE, [*frames, rig])
         record, notes = read_rig(rig)
-        output.print(*notes) if notes else None
+        if notes:
+            output.print(*notes)
         chosen = Chosen(start, end, stride)
         incoming, count = frames_of(frames, record, chosen, pattern, refine=refine)
         with _progress(output, count) as (say, on_frame):
@@ -95,8 +96,6 @@ def _progress(
 
         def say(step: str) -> None:
             advance(done, step)
-            if lines:
-                print(step, file=sys.stderr, flush=True)
 
         def on_frame(row: "FrameRow") -> None:
             nonlocal done

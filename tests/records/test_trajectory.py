@@ -1,0 +1,60 @@
+"""Trajectory files."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.records.trajectory import FrameRow, load_tum, save_frames, save_tum
+
+POSE = RigidTransform.of([0.0, 0.0, np.pi / 2], [1.0, -2.0, 3.5])
+
+
+def test_tum_line_is_position_and_quaternion(tmp_path: Path) -> None:
+    """Oracle: a quarter turn about z is (0, 0, sin 45, cos 45)."""
+    save_tum(tmp_path / "a.tum", [(7.0, POSE)])
+    numbers = [float(x) for x in (tmp_path / "a.tum").read_text().split()]
+    assert numbers == pytest.approx([7, 1, -2, 3.5, 0, 0, np.sqrt(0.5), np.sqrt(0.5)])
+
+
+def test_tum_files_read_back(tmp_path: Path) -> None:
+    save_tum(tmp_path / "a.tum", [(0.0, RigidTransform.identity()), (2.0, POSE)])
+    text = "# a comment\n\n" + (tmp_path / "a.tum").read_text()
+    (tmp_path / "b.tum").write_text(text)
+    (first, _), (second, pose) = load_tum(tmp_path / "b.tum")
+    assert (first, second) == (0.0, 2.0)
+    assert pose.matrix() == pytest.approx(POSE.matrix())
+
+
+@pytest.mark.parametrize(
+    "line", ["1 2 3", "a b c d e f g h", "0 1 2 3 0 0 0 0", "0 1 2 3 0 0 0 nan"]
+)
+def test_other_lines_are_refused(line: str, tmp_path: Path) -> None:
+    (tmp_path / "a.tum").write_text(f"0 0 0 0 0 0 0 1\n{line}\n")
+    with pytest.raises(InputError, match="line 2: is not 't x y z qx qy qz qw'"):
+        load_tum(tmp_path / "a.tum")
+
+
+def test_table_has_a_line_a_frame(tmp_path: Path) -> None:
+    std = np.arange(1.0, 7.0)
+    rows = [
+        FrameRow(0, "a", world_from_camera=POSE, projector_from_camera=POSE, camera_std=std,
+                 keyframe=True, overlap=0.5),
+        FrameRow(1, "b", lost="it is dark, and moved"),
+    ]  # fmt: skip
+    save_frames(tmp_path / "frames.csv", rows)
+    with (tmp_path / "frames.csv").open(newline="") as file:
+        first, second = csv.DictReader(file)
+    assert first["camera_z"] == "3.5"
+    assert first["camera_std_turn_y"] == "2"
+    assert first["camera_std_z"] == "6"
+    assert first["projector_std_x"] == ""
+    assert (first["keyframe"], first["overlap"], first["misfit"]) == ("1", "0.5", "")
+    assert (second["lost"], second["camera_x"]) == ("it is dark, and moved", "")
+    assert rows[1].world_from_projector is None
+    at = rows[0].world_from_projector
+    assert at is not None
+    assert at.matrix() == pytest.approx(np.eye(4))
