@@ -103,9 +103,9 @@ def place(
             break
         widened = max(1.0, widened / 2)
     seen = against_map(sample, found, poses.world_from_camera, volume)
-    A, _ = _equations(found, seen, noise, volume.voxel, 1.0)
-    A[:6, :6] += prior.information
-    covariance = np.linalg.inv(A).astype(np.float64)
+    curvature = _curvature(found, seen, noise, volume.voxel)
+    curvature[:6, :6] += prior.information
+    covariance = np.linalg.inv(curvature).astype(np.float64)
     scatter = _scatter(sample.block, found, seen, noise, volume.voxel)
     clustered = covariance @ scatter @ covariance
     return _judged(found, seen, poses, noise, volume.voxel, settled, (covariance, clustered))
@@ -153,9 +153,36 @@ def _equations(
     b[:6] = across @ (on_line * r)
     A += (along * on_map) @ along.T
     b += along @ (on_map * d)
-    # Holds the camera where no map is known, and moves nothing else by a hundredth of its noise.
-    A[np.arange(12), np.arange(12)] += 1e-9 * np.trace(A)
-    return A, b
+    return _held(A), b
+
+
+def _held(A: Floats) -> Floats:
+    """Hold the camera where no map is known; nothing else moves by a hundredth of its noise."""
+    return A + 1e-9 * np.trace(A) * np.eye(12)
+
+
+def _curvature(found: Triangulated, seen: AgainstMap, noise: float, voxel: float) -> Floats:
+    """Return the cost's second derivatives (12, 12), which say how far noise moves the minimum.
+
+    The weights that make the steps overstate it. With r the residual over c = :data:`FAR`, the loss
+    of Geman and McClure has the influence r / (1 + r^2)^2 and the curvature
+    (1 - 3 r^2) / (1 + r^2)^3,
+    of which the mean over the residuals is taken.
+    """
+    (across, on_line, r), (along, _, d) = _rows(found, seen, noise, voxel, 1.0)
+    known = seen.known & found.good
+    A = np.zeros((12, 12))
+    A[:6, :6] = _mean_curvature(r[found.good]) * (across * found.good) @ across.T
+    A += _mean_curvature(d[known]) * (along * (on_line * known)) @ along.T
+    return _held(A)
+
+
+def _mean_curvature(residual: Floats) -> float:
+    """Return the mean second derivative of the loss, at least a tenth of least squares'."""
+    if not len(residual):
+        return 1.0
+    squared = (residual / FAR) ** 2
+    return max(float(np.mean((1 - 3 * squared) / (1 + squared) ** 3)), 0.1)
 
 
 def _rows(
