@@ -45,7 +45,11 @@ class FrameRow:
     """Share of the correspondences where the map was known before the frame."""
     agreement: float | None = None
     """Share of these within three standard deviations of the map."""
-    seconds: float = 0.0
+    rms_px: float | None = None
+    """Robust RMS of the residuals of the pixels used, pattern pixels."""
+    coverage: float | None = None
+    """Share of the image's pixels that were used."""
+    seconds: float | None = None
 
     @property
     def world_from_projector(self) -> RigidTransform | None:
@@ -116,7 +120,7 @@ def _heads() -> list[str]:
         "number", "name", "part", "keyframe", "lost",
         *(f"camera_{p}" for p in pose), *(f"camera_std_{s}" for s in _STEP),
         *(f"projector_{p}" for p in pose), *(f"projector_std_{s}" for s in _STEP),
-        "noise_px", "misfit", "overlap", "agreement", "seconds",
+        "noise_px", "misfit", "overlap", "agreement", "rms_px", "coverage", "seconds",
     ]  # fmt: skip
 
 
@@ -126,7 +130,8 @@ def _cells(row: FrameRow) -> list[str]:
         *_pose(row.world_from_camera), *_numbers(row.camera_std, 6),
         *_pose(row.projector_from_camera), *_numbers(row.projector_std, 6),
         *(_number(x) for x in (row.noise_px, row.misfit, row.overlap, row.agreement)),
-        f"{row.seconds:.4f}",
+        *(_number(x) for x in (row.rms_px, row.coverage)),
+        "" if row.seconds is None else f"{row.seconds:.4f}",
     ]  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
-from ..decode.image_files import ImageFrame, images_of, is_images, read_frames
+from ..decoding.image_files import ImageFrame, images_of, is_images, read_frames
 from ..errors import InputError
 from ..reading.regular import MAP, regular
 from ..records.correspondence import SUFFIXES as MAPS
@@ -99,9 +99,9 @@ def _loaded(files: Sequence[Path]) -> Iterator[Incoming]:
 def _decoded(
     images: Iterator[ImageFrame], rig: Rig, pattern: str, refine: bool
 ) -> Iterator[Incoming]:
-    from ..decode.grid.decode import decode_image
-    from ..decode.network import load_network
-    from ..decode.pattern_option import coded_grid
+    from ..decoding.grid.decode import decode_image
+    from ..decoding.network import load_network
+    from ..decoding.pattern_option import coded_grid
     from ..refine.decoded import decoded_map
 
     grid = coded_grid(pattern, rig.projector.width, rig.projector.height)

@@ -101,7 +101,7 @@ def _solution(recorded: Recorded, beginning: Beginning, main: int) -> Solution:
         "noise_px": float(np.median(noise)) if noise else alone.noise_px,
         "model": {},
         "observability": {},
-        "timings": {**recorded.seconds, "frames": sum(row.seconds for row in rows)},
+        "timings": {**recorded.seconds, "frames": sum(row.seconds or 0.0 for row in rows)},
         "versions": versions(),
         "configuration": {"rig": recorded.rig.model_dump(mode="json")},
     })  # fmt: skip

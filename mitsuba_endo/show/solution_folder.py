@@ -26,6 +26,7 @@ from .map_names import SURFACE, map_names, observed_names, own_surface_name
 from .read_folder import save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
+from .trajectory_files import save_trajectories
 from .view import view_surface
 
 SCENE = "scene.xml"
@@ -52,6 +53,9 @@ def write_solution_folder(
     rendered*.exr         projector coordinates rendered from the solution, one file a frame
     observed*.exr         projector coordinates as they came in, and which of them were used
     surface_modes.npz     what the errors of a surface's vertices have in common
+    frames.csv            a line a frame: poses with standard deviations, residuals, coverage, and
+                          why a frame was left out
+    trajectory_*.tum      camera and projector in the world, as the RGB-D benchmark has them
     trace.csv             the iterations
     history.npz           where they stood: poses and coarse surfaces, for the viewer
     state.npz             from which ``calibrate --resume`` goes on
@@ -80,6 +84,7 @@ def write_solution_folder(
         for k, surface in calibration.own_surfaces.items():
             save_surface(folder / own_surface_name(k), surface)
         _save_modes(folder, calibration)
+        save_trajectories(folder, solution)
         save_trace(folder / "trace.csv", calibration.trace)
         if calibration.history:
             save_history(folder / HISTORY, thinned(calibration.history))

@@ -18,12 +18,14 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.correspondence import load_map, read_exr
 from mitsuba_endo.records.rig import Rig, load_rig
-from mitsuba_endo.records.solution import Estimate, PoseEstimate, load_solution
+from mitsuba_endo.records.solution import Estimate, LeftOut, PoseEstimate, load_solution
 from mitsuba_endo.records.surface import load_surface
+from mitsuba_endo.records.trajectory import load_tum
 from mitsuba_endo.show import solution_folder
 from mitsuba_endo.show.map_names import map_names
 from mitsuba_endo.show.scene_file import save_scene
 from mitsuba_endo.show.solution_folder import write_solution_folder
+from mitsuba_endo.show.trajectory_files import frame_rows
 
 SIZE = {"width": 64, "height": 46}
 PICTURES = {
@@ -36,6 +38,9 @@ FILES = {
     "surface.ply",
     "scene.xml",
     "trace.csv",
+    "frames.csv",
+    "trajectory_camera.tum",
+    "trajectory_projector.tum",
     "history.npz",
     "rendered.exr",
     "observed.exr",
@@ -112,6 +117,34 @@ def test_depth_points_and_mask(written: Path, calibration: Calibration):
     frame = calibration.frames[0]
     np.testing.assert_array_equal(mask == 255, frame.used)
     np.testing.assert_array_equal(mask > 0, np.isfinite(frame.observed).all(-1) | frame.used)
+
+
+def test_frames_and_trajectories(written: Path, calibration: Calibration):
+    """Oracle: the solution's poses, to nine digits; a frame's number is its time."""
+    frame = calibration.solution.frames[0]
+    (row,) = csv.DictReader((written / "frames.csv").read_text("utf-8").splitlines())
+    assert row["name"] == frame.name
+    assert [float(row[f"projector_{a}"]) for a in "xyz"] == pytest.approx(
+        frame.projector_from_camera.t, rel=1e-8
+    )
+    assert frame.projector_from_camera.std is not None
+    assert float(row["projector_std_x"]) == pytest.approx(
+        frame.projector_from_camera.std[3], rel=1e-8
+    )
+    assert float(row["rms_px"]) == pytest.approx(frame.rms_px, rel=1e-8)
+    assert 0 < float(row["coverage"]) < 1
+    pose = frame.projector_from_camera.to_transform()
+    assert pose is not None
+    ((time, found),) = load_tum(written / "trajectory_projector.tum")
+    assert time == 0
+    np.testing.assert_allclose(found.matrix(), pose.inverse().matrix(), atol=1e-7)
+
+
+def test_frames_left_out_are_rows_too(calibration: Calibration):
+    """Oracle: the reason."""
+    left = [LeftOut(name="dark", reason="it shows nothing")]
+    rows = frame_rows(calibration.solution.model_copy(update={"left_out": left}))
+    assert [(r.number, r.name, r.lost) for r in rows[1:]] == [(1, "dark", "it shows nothing")]
 
 
 def test_nothing_extra_unless_asked(tmp_path: Path, calibration: Calibration):

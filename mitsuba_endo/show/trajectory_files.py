@@ -1,0 +1,55 @@
+"""Poses of a solution's frames as a table and as trajectories, for spreadsheets and ``evo``."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..records.solution import Frame, PoseEstimate, Solution
+from ..records.trajectory import FrameRow, save_frames, save_tum
+
+FRAMES = "frames.csv"
+CAMERA, PROJECTOR = "trajectory_camera.tum", "trajectory_projector.tum"
+
+
+def save_trajectories(folder: Path, solution: Solution) -> None:
+    """Write ``frames.csv`` and both trajectories, times being the frames' numbers from 0.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    rows = frame_rows(solution)
+    save_frames(folder / FRAMES, rows)
+    cameras = [(r.number, r.world_from_camera) for r in rows if r.world_from_camera is not None]
+    projectors = [
+        (r.number, r.world_from_projector) for r in rows if r.world_from_projector is not None
+    ]
+    save_tum(folder / CAMERA, cameras)
+    save_tum(folder / PROJECTOR, projectors)
+
+
+def frame_rows(solution: Solution) -> list[FrameRow]:
+    """Return a row for every frame, and for those left out, with the reason."""
+    pixels = None if solution.camera is None else solution.camera.width * solution.camera.height
+    known = [_row(k, frame, pixels) for k, frame in enumerate(solution.frames)]
+    return known + [
+        FrameRow(len(known) + k, out.name, lost=out.reason)
+        for k, out in enumerate(solution.left_out)
+    ]
+
+
+def _row(number: int, frame: Frame, pixels: int | None) -> FrameRow:
+    camera, projector = frame.world_from_camera, frame.projector_from_camera
+    return FrameRow(
+        number,
+        frame.name,
+        world_from_camera=camera.to_transform(),
+        projector_from_camera=projector.to_transform(),
+        camera_std=_std(camera),
+        projector_std=_std(projector),
+        rms_px=frame.rms_px,
+        coverage=None if frame.used is None or pixels is None else frame.used / pixels,
+    )
+
+
+def _std(pose: PoseEstimate) -> np.ndarray | None:
+    return None if pose.std is None else np.array(pose.std, float)
