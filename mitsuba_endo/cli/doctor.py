@@ -6,6 +6,7 @@ import platform
 import re
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -26,6 +27,12 @@ ABORTING_LLVM = "Cannot select"
 NEED_A_VARIANT = ("threads", "exr", "plugins")
 PROBES = ("llvm", "llvm_ad_rgb", "cuda_ad_rgb", "scalar_rgb", *NEED_A_VARIANT)
 """Names in :mod:`mitsuba_endo.cli.probes`, which only child processes import."""
+EXTRAS = {
+    "decode": ("faster decoding", ("onnxruntime",)),
+    "view": ("the live viewer", ("viser",)),
+    "dataset": ("HDF5 stores and clusters", ("h5py", "dask", "distributed")),
+}
+"""Of every extra that users want: what it is for, and its packages."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,26 @@ def examine(out: Session) -> list[Check]:
                 checks.append(Check(name, "not tried", "needs llvm_ad_rgb or cuda_ad_rgb"))
             else:
                 checks.append(_judge(name, *run_probe(name)))
-    return [*_without_needless_faults(checks), _leftovers()]
+    return [*_without_needless_faults(checks), *_extras(), _leftovers()]
+
+
+def _extras() -> list[Check]:
+    """Say which extras are installed: without one, what it is for is refused by name."""
+    return [
+        _extra(name, use, packages, importlib.metadata.version)
+        for name, (use, packages) in EXTRAS.items()
+    ]
+
+
+def _extra(name: str, use: str, packages: Sequence[str], version: Callable[[str], str]) -> Check:
+    found = []
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except importlib.metadata.PackageNotFoundError:
+            todo = f'pip install "mitsuba-endo[{name}]"'
+            return Check(f"extra {name}", "absent", f"{use}: {package} is not installed", todo)
+    return Check(f"extra {name}", "ok", ", ".join(found))
 
 
 def _leftovers() -> Check:

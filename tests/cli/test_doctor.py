@@ -1,7 +1,9 @@
 """``doctor`` finds what does not work and survives what would kill it."""
 
+import importlib.metadata
 import json
 import stat
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,9 @@ def test_working_installation():
     data = json.loads(result.stdout)
     assert result.exit_code == 0, data
     status = {check["name"]: check["status"] for check in data["checks"]}
-    assert set(status) == {"versions", "leftovers", *doctor.PROBES}
+    assert set(status) == {
+        "versions", "leftovers", *doctor.PROBES, *(f"extra {name}" for name in doctor.EXTRAS),
+    }  # fmt: skip
     needed = ("llvm_ad_rgb", "threads", "exr", "plugins")
     assert [status[name] for name in needed] == ["ok"] * len(needed)
 
@@ -91,3 +95,32 @@ def test_a_gpu_makes_llvm_needless():
     assert [c.status for c in doctor._without_needless_faults(checks)] == ["absent", "ok"]
     alone = doctor._without_needless_faults(checks[:1])
     assert alone[0].status == "fault"
+
+
+def test_extras_are_the_package_s() -> None:
+    """Oracle: pyproject.toml, whose extras for users are told with the packages they bring."""
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8")
+    declared = tomllib.loads(text)["project"]["optional-dependencies"]
+    for name, (_, packages) in doctor.EXTRAS.items():
+        brought = " ".join(declared[name])
+        assert all(package in brought for package in packages)
+    assert {"learn", "docs", "test", "lint", "benchmark", "reproduce"} == {*declared} - {
+        *doctor.EXTRAS
+    }
+
+
+def test_an_extra_that_is_missing_is_told_with_its_remedy() -> None:
+    """Oracle: the extra's name; nothing of it is a fault."""
+
+    def version(package: str) -> str:
+        if package == "viser":
+            raise importlib.metadata.PackageNotFoundError(package)
+        return "1.2"
+
+    missing = doctor._extra("view", "the live viewer", ("viser",), version)
+    assert (missing.status, missing.found) == (
+        "absent", "the live viewer: viser is not installed"
+    )  # fmt: skip
+    assert missing.mend == 'pip install "mitsuba-endo[view]"'
+    there = doctor._extra("decode", "faster decoding", ("onnxruntime",), version)
+    assert (there.status, there.found) == ("ok", "onnxruntime 1.2")

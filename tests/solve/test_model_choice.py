@@ -40,6 +40,7 @@ def test_law_of_the_data_is_chosen(law: str) -> None:
     assert solution.projector.law == evidence["chosen"] == law
     assert evidence["decided"]
     assert evidence["conclusion"].startswith(f"the residuals support {law} over {other}")
+    assert f"Projection model: {evidence['conclusion']}." in solution.verdict
     assert evidence["noise_px"][law] < evidence["noise_px"][other]
     assert evidence["standard_errors"] > 5
     assert not any("cannot tell" in w for w in solution.warnings)

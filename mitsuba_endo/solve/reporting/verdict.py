@@ -10,7 +10,7 @@ def verdict(solution: Solution) -> list[str]:
     """Return one sentence for each unknown, the most important first."""
     unit = solution.units if solution.units == "mm" else "baselines"
     out = [_scale(solution)]
-    out += _intrinsics(solution)
+    out += _projection_model(solution) + _intrinsics(solution)
     first = solution.frames[0].projector_from_camera
     several = any(f.projector_from_camera != first for f in solution.frames)
     for frame in solution.frames:
@@ -41,6 +41,12 @@ def _scale(solution: Solution) -> str:
         else ""
     )
     return f"Scale: lengths are in mm, from the {source}{spread}."
+
+
+def _projection_model(solution: Solution) -> list[str]:
+    """Say which projection model was chosen and by how much, where several were compared."""
+    conclusion = solution.law_evidence.get("conclusion")
+    return [f"Projection model: {conclusion}."] if conclusion else []
 
 
 def _intrinsics(solution: Solution) -> list[str]:
