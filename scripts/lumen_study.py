@@ -18,6 +18,8 @@ from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 from tests.lumen import FOCAL, Lumen, withdrawn
 
+KINDS = ("mesh", "lattice")
+
 
 def figures(lumen: Lumen, result: Calibration) -> dict[str, float]:
     """Return errors of a calibration and how often its 95 % intervals hold the truth."""
@@ -59,9 +61,12 @@ def main() -> None:
     """Parse, calibrate on either surface, print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=1, help="withdrawals, each with its own noise")
-    for seed in range(parser.parse_args().seeds):
-        lumen = withdrawn(seed=seed)
-        for surface in ("mesh", "lattice"):
+    parser.add_argument("--noise", type=float, default=0.3, help="of a coordinate, pattern pixels")
+    parser.add_argument("--surface", choices=KINDS, help="one kind alone")
+    given = parser.parse_args()
+    for seed in range(given.seeds):
+        lumen = withdrawn(seed=seed, noise=given.noise)
+        for surface in [given.surface] if given.surface else KINDS:
             with threadpool_limits(1, "blas"):
                 result = calibrate(lumen.maps, lumen.rig(), Options(surface=surface))
             print(f"\nseed {seed}, {surface}: {result.solution.outcome}")

@@ -10,6 +10,7 @@ radians, pattern pixels.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.records.rig import Camera, Rig
 from mitsuba_endo.rendering.decoder_errors import like_decoded
 from mitsuba_endo.shapes import Mesh, make_shape
 from tests.solve.views import Views
@@ -45,17 +45,8 @@ class Lumen(Views):
 
     mesh: Mesh
     """The true surface, world."""
-
-    def rig(self, **changes: object) -> Rig:
-        data = {
-            "camera": Camera.from_model(self.camera),
-            "projector": {
-                "law": self.projector.law, "width": SIZE[0], "height": SIZE[1],
-                "centre": list(CENTRE),
-            },
-            "scale": {"baseline": self.baseline},
-        }  # fmt: skip
-        return Rig.model_validate({**data, **changes})
+    size: ClassVar[tuple[float, float]] = SIZE
+    centre: ClassVar[tuple[float, float]] = CENTRE
 
     @property
     def ranges(self) -> list[Floats]:

@@ -59,17 +59,14 @@ def calibrate(
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"), examined.told_on_failure():
-        weighted = balanced(examined.maps)
-        jobs = [
-            Job(weighted, camera, rig, law, options, resume, history=History(observe))
-            for law in _laws(rig, resume)
-        ]
+        weighted, laws = balanced(examined.maps), _laws(rig, resume)
+        jobs = [Job(weighted, camera, rig, law, options, resume, history=History(observe))
+                for law in laws]  # fmt: skip
         fits = solve_each(jobs, say)
         say(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
-        unused = unused_deviations(rig, fit.result.problem.layout, options)
-        told = [*examined.warnings, *unused, *warnings]
-        return assemble(fit, camera, rig, options, evidence, told)
+        warnings = [*unused_deviations(rig, fit.result.problem.layout, options), *warnings]
+        return assemble(fit, camera, rig, options, evidence, [*examined.warnings, *warnings])
 
 
 def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:

@@ -164,11 +164,11 @@ def test_reaches_the_lattice_on_its_own_triangles(
 
 
 def test_a_smooth_sheet_is_as_good_as_on_the_lattice_with_fewer_vertices(llvm: str) -> None:
-    """Oracle: the true sheet of the benchmark, coarser; 0.1 % of focal length.
+    """Oracle: the true sheet of the benchmark, in two frames; 0.1 % of focal length.
 
-    The sheet bends little for its noise, which is ten times that of the lumen at this distance.
+    It bends so little that noise allows longer edges than the lattice's spacing.
     """
-    frames = make_frames(4, 0, pixels=100)
+    frames = make_frames(2, 0, pixels=140)
     found = {
         surface: calibrate(frames.maps, frames.rig, Options(surface=surface, jackknife=False))
         for surface in ("mesh", "lattice")
@@ -176,12 +176,11 @@ def test_a_smooth_sheet_is_as_good_as_on_the_lattice_with_fewer_vertices(llvm: s
     focal, baseline = errors(frames, found["mesh"])
     assert focal < 0.1
     assert baseline < 0.5
-    shape = {
-        surface: np.sqrt(np.mean(sheet_distances(result.surface.vertices) ** 2))
-        for surface, result in found.items()
-    }
-    assert shape["mesh"] < 1.1 * shape["lattice"]
-    assert len(found["mesh"].surface.vertices) < len(found["lattice"].surface.vertices)
+    vertices = [found[surface].surface.vertices for surface in ("mesh", "lattice")]
+    off = np.split(sheet_distances(np.concatenate(vertices)), [len(vertices[0])])
+    mesh, lattice = (np.sqrt(np.mean(d**2)) for d in off)
+    assert mesh < 1.1 * lattice
+    assert len(vertices[0]) < len(vertices[1])
 
 
 @pytest.mark.parametrize(("noise", "bend"), [(4.0, 1.0), (1.0, 4.0), (1.0, 1 / 4)])
@@ -194,7 +193,7 @@ def test_edges_grow_with_noise_and_shrink_with_curvature(noise: float, bend: flo
     after = edge_lengths(fine, frames, distances, 300.0)
     assert np.median(after / before) == pytest.approx(np.cbrt(noise / bend), rel=0.02)
     spacing = 5.0 * frames[0].cell
-    for extreme, limit in ((1e6, 2.5), (1e-9, 0.7)):
+    for extreme, limit in ((1e6, 2.5), (1e-9, 0.5)):
         frames, fine = hollow_sphere(noise=extreme, radius=1.0)
         at_limit = edge_lengths(fine, frames, distances, 300.0)
         np.testing.assert_allclose(at_limit, limit * spacing, rtol=1e-9)

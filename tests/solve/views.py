@@ -7,6 +7,7 @@ middle of a non-square pattern. Units mm, radians, pattern pixels.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,9 @@ class Views:
     projector_from_camera: list[RigidTransform]
     points: list[NDArray[np.float64]]
     """(H, W, 3) seen by each camera, in its frame."""
+    size: ClassVar[tuple[float, float]] = SIZE
+    centre: ClassVar[tuple[float, float]] = CENTRE
+    """Of the pattern and the projector, pattern pixels."""
 
     @property
     def baseline(self) -> float:
@@ -48,8 +52,8 @@ class Views:
         data = {
             "camera": Camera.from_model(self.camera),
             "projector": {
-                "law": self.projector.law, "width": SIZE[0], "height": SIZE[1],
-                "centre": list(CENTRE),
+                "law": self.projector.law, "width": self.size[0], "height": self.size[1],
+                "centre": list(self.centre),
             },
             "scale": {"baseline": self.baseline},
         }  # fmt: skip

@@ -18,9 +18,11 @@ from ..inference.fit import FrameSolution
 
 Floats = NDArray[np.float64]
 
-_SAGITTA = 1 / 5
-"""Largest share of the noise sigma_n / h that the sagitta may reach."""
-_FINEST, _COARSEST = 0.7, 2.5
+_SAGITTA = 1 / 8
+"""Largest share of the noise sigma_n / h that the sagitta may reach. In a folded lumen a fifth is
+seen in the poses, since chords err alike over many pixels: 95 % intervals held the truth in 88 to
+94 % of their components over five draws of the lumen study, with an eighth in 94 to 100 %."""
+_FINEST, _COARSEST = 0.5, 2.5
 """Of edges, in spacings of a single frame's lattice there: several frames see more than one, but
 not more than their pixels; and steps from one size to the next stay small."""
 _ROUNDS = 8
