@@ -20,9 +20,10 @@ from .frames.weights import balanced
 from .history import History
 from .inference.fit import Fit
 from .inference.model_choice import cheaper, choose_law
+from .job import Job, Optimised, with_centre
 from .minimisers.minimise import Progress, minimiser_of
 from .options import Options
-from .pipeline import Job, Optimised, infer, optimise, optimise_again, with_centre
+from .pipeline import infer, optimise, optimise_again
 from .reporting.assemble import assemble
 
 

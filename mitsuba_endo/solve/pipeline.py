@@ -1,15 +1,11 @@
 """The stages from maps to a fit, for one frame, frames with their own surfaces, or a shared one."""
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-from ..geometry.cameras import CameraModel
 from ..records.calibration import TraceRow
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
-from ..records.rig import Rig
 from ..records.solution import LeftOut, Outcome
 from ..start.registration import RangeImage, Registration, register_frames
 from ..start.result import Start
@@ -19,7 +15,6 @@ from .frames.alone import solve_alone
 from .frames.initialisation import common_start, usable_starts, without_faults, without_repeats
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
 from .frames.joint_mesh import joint_mesh_problem
-from .frames.projector_centre import centre_is_assumed, resumed_centre, searched_centre
 from .frames.restart import with_restarts
 from .frames.resume import resumed_maps, resumed_problem
 from .frames.single import separate_surfaces
@@ -30,73 +25,14 @@ from .inference.frame_consistency import consistencies, worst
 from .inference.model_error.analysis import check_model
 from .inference.observability import Direction
 from .inference.predicted_observability import predicted_directions
+from .job import Job, Optimised
 from .minimisers.minimise import OnIteration, Progress, minimise
 from .minimisers.result import OptimisationResult
 from .minimisers.smoothing import smooth_surfaces
-from .options import Options
-from .unknowns.layout import Layout, make_layout
 from .unknowns.state import State
 
 _MAX_EXTENSIONS = 10
 """Times that the surface may grow while cameras that started at one place spread."""
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What is to be solved, under one projection model."""
-
-    maps: list[CorrespondenceMap]
-    camera: CameraModel
-    rig: Rig
-    law: str
-    options: Options
-    resume: Checkpoint | None = None
-    """Earlier calibration to go on with."""
-    timings: dict[str, float] = field(default_factory=dict)
-    """Seconds of every stage, filled in while solving."""
-    history: History = field(default_factory=History)
-    """How the last optimisation went, likewise."""
-    notes: tuple[str, ...] = ()
-    """What was assumed before it began."""
-
-    @contextmanager
-    def timed(self, stage: str) -> Iterator[None]:
-        """Add the time of a block to a stage's."""
-        began = time.perf_counter()
-        yield
-        self.timings[stage] = self.timings.get(stage, 0.0) + time.perf_counter() - began
-
-    def layout(self, frames: int) -> Layout:
-        """Return the layout of the unknowns of so many frames."""
-        return make_layout(self.rig, frames)
-
-
-@dataclass(frozen=True, eq=False)
-class Optimised:
-    """Where an optimisation of a job ended."""
-
-    maps: list[CorrespondenceMap]
-    """The frames that are part of it."""
-    left_out: list[LeftOut]
-    notes: list[str]
-    result: OptimisationResult
-    predicted: list[Direction]
-    """What its start left free."""
-
-
-def with_centre(job: Job, say: Progress) -> Job:
-    """Return the job with the projector's centre looked for, where a lens has none given."""
-    if not centre_is_assumed(job.rig, job.law):
-        return job
-    say(0.0, "Looking for the projector's centre")
-    with job.timed("start"):
-        if job.resume is not None:
-            rig, note = resumed_centre(job.resume, job.rig)
-        else:
-            sound, _ = without_faults(job.maps, job.rig)
-            layout = job.layout(len(job.maps))
-            rig, note = searched_centre(sound, job.camera, job.rig, layout, job.options)
-    return replace(job, rig=rig, notes=(note,))
 
 
 def optimise(job: Job, say: Progress) -> Optimised:

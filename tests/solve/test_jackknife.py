@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from mitsuba_endo.solve.elimination.normal import NormalEquations
 from mitsuba_endo.solve.inference import jackknife
 from mitsuba_endo.solve.inference.response import response
+from mitsuba_endo.solve.job import Job
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.pipeline import Job, optimise
+from mitsuba_endo.solve.pipeline import optimise
 from tests.solve.views import Views
 
 

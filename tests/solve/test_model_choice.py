@@ -13,10 +13,10 @@ from mitsuba_endo.solve import pipeline
 from mitsuba_endo.solve.calibrate import calibrate, solve_each
 from mitsuba_endo.solve.inference.fit import Fit
 from mitsuba_endo.solve.inference.model_choice import choose_law
+from mitsuba_endo.solve.job import Job, Optimised
 from mitsuba_endo.solve.minimisers.minimise import Progress
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.pipeline import Job
 from tests.range_scenes import height_field
 from tests.solve.views import POSE, Views, look, projector_poses, relief_surface, steps
 
@@ -82,9 +82,9 @@ def ended(fit: Fit, outcome: Outcome, step: float) -> Fit:
 
 def test_interrupt_in_the_second_try_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """Oracle: the law's own optimum, said to be interrupted; no other law is finished."""
-    found: list[pipeline.Optimised] = []
+    found: list[Optimised] = []
 
-    def optimise(job: Job, say: Progress) -> pipeline.Optimised:
+    def optimise(job: Job, say: Progress) -> Optimised:
         found.append(pipeline.optimise(job, say))
         return found[-1]
 
