@@ -15,6 +15,7 @@ from .errors import InputError
 
 LLVM_PACKAGE = "karellen-llvm-core"
 MINIMUM_LLVM = (17,)
+"""Major version: kernels of Dr.Jit abort under older ones at the first minimum or clip."""
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
 LEAST_MEMORY = 512 << 20
 """Bytes of address space: Mitsuba and LLVM take 220 MiB to start, kernels come on top."""

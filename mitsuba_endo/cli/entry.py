@@ -7,6 +7,7 @@ from types import FrameType
 from ..memory import left
 
 EXIT_INTERRUPTED = 130
+"""128 plus the number of SIGINT, as shells report it."""
 INTERRUPTED = "interrupted; no output was left half written."
 EXIT_MEMORY = 71
 """The system gives no more memory, threads or files (EX_OSERR of sysexits.h)."""

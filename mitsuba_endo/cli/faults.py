@@ -6,6 +6,7 @@ from ..errors import InputError, shown
 from .entry import EXIT_MEMORY, SHORT
 
 EXIT_INPUT = 2
+"""The code of usage errors, as Typer and most Unix commands give it."""
 _SYSTEM = {
     errno.ENOSPC: "make room", errno.EDQUOT: "make room", errno.EFBIG: "raise `ulimit -f`",
     errno.EROFS: "choose another folder", errno.EACCES: "choose another folder",

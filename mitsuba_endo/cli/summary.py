@@ -28,6 +28,7 @@ METRICS = {
 
 INTERVAL_COLUMN = "± (95 %)"
 _ROUNDING = 1e-12
+"""A value below, in whatever unit, is a rounding error of double precision and shown as 0."""
 
 
 def solution_table(solution: "Solution") -> "Table":

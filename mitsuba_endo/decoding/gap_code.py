@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 WINDOW = 3
+"""Nodes along a side of the neighbourhood that names its place: 3^9 = 19,683 codes, while 2 x 2
+would have 81."""
 LETTERS = {1: "R", 0: "S", -1: "L"}
 """Right part of the line higher, both level, left part higher."""
 MAX_STEPS = 30

@@ -16,6 +16,7 @@ from .grid_pattern import CodedGrid
 
 PNG, TIFF, SVG, JSON = "coded.png", "coded.tiff", "coded.svg", "coded.json"
 _FULL = {8: np.uint8, 16: np.uint16}
+"""Type of a pixel by its bits."""
 _FWHM = 2 * float(np.sqrt(2 * np.log(2)))
 """Width of a Gaussian at half its height over its standard deviation."""
 

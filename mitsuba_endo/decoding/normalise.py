@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 INPUT_CHANNELS = 2
+"""Of the network, whose weights expect them: brightness, and its local normalisation."""
 REACH = 31
 """Window of the local normalisation, pixels: about three periods of the grid."""
 FLOOR = 1.5 / 255

@@ -15,6 +15,8 @@ Axis = Literal["x", "y"]
 AXES: tuple[Axis, Axis] = ("x", "y")
 
 FINEST_PERIOD = 16.0
+"""Default period of the finest fringes, pattern pixels. Chosen: a camera as fine as the pattern has
+16 pixels a fringe."""
 MAX_RATIO = 6.0
 """Of neighbouring default periods: the coarser phase must tell which fringe the finer is in."""
 STRIPES = (1, 2, 4, 8, 16, 32)

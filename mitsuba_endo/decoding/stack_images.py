@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robust import robust_std
+
 NOISE_IMAGES = 8
 """Of the stack, evenly drawn, from which the noise is estimated."""
 NOISE_PIXELS = 1 << 22
@@ -72,9 +74,8 @@ def estimate_noise(stack: StackSource) -> float:
     height, width = stack.shape
     rows = min(height, max(3, NOISE_PIXELS // width))
     start = (height - rows) // 2
-    scale = 1.4826 / np.linalg.norm(kernel)
     spreads = []
     for image in chosen:
         brightness = stack.rows([image], start, start + rows).images[0]
-        spreads.append(float(np.median(np.abs(cv2.filter2D(brightness, -1, kernel)))) * scale)
+        spreads.append(robust_std(cv2.filter2D(brightness, -1, kernel)) / np.linalg.norm(kernel))
     return max(float(np.median(spreads)), 1 / (stack.levels * np.sqrt(12)))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robust import robust_std
+
 Floats = NDArray[np.float64]
 
 
@@ -73,12 +75,12 @@ def align_robustly(
 
     Both points of a pair lie on one camera ray; at a step one surface may be hit before it and the
     other behind. After each fit, pairs farther apart than five robust standard deviations
-    (1.4826 times the median distance) are left out of the next.
+    are left out of the next.
     """
     kept = np.ones(len(source))
     found = align(source, target, scale=scale, rotation=rotation)
     for _ in range(steps):
         apart = np.linalg.norm(target - found.apply(source), axis=-1)
-        kept = (apart <= 5 * 1.4826 * np.median(apart)).astype(float)
+        kept = (apart <= 5 * robust_std(apart)).astype(float)
         found = align(source, target, kept, scale=scale, rotation=rotation)
     return found

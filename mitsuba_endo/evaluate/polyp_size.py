@@ -24,6 +24,7 @@ from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import tangent_basis
 from ..records.calibration import SurfaceEstimate
+from ..robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -161,7 +162,7 @@ def _wall(points: Floats, rays: Floats) -> tuple[Floats, Floats]:
         middle = points[kept].mean(0)
         normal = np.linalg.svd(points[kept] - middle, full_matrices=False)[2][-1]
         off = np.abs((points - middle) @ normal)
-        kept = off <= 2.5 * 1.4826 * np.median(off)
+        kept = off <= 2.5 * robust_std(off)
     return -normal * np.sign(np.mean(rays @ normal)), middle
 
 

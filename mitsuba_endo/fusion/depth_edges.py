@@ -8,6 +8,8 @@ changes far more than on both sides.
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robust import robust_std
+
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -88,6 +90,6 @@ def noise(inverse_range: Floats) -> float:
     Their median is blind to edges; what a smooth surface bends by counts as noise.
     """
     second = np.diff(inverse_range, n=2, axis=1)
-    second = np.abs(second[np.isfinite(second)])
-    # A second difference has sqrt(1 + 4 + 1) times the noise, its median is 0.6745 deviations.
-    return float(np.median(second)) / 0.6745 / np.sqrt(6) if len(second) else 0.0
+    second = second[np.isfinite(second)]
+    # A second difference has sqrt(1 + 4 + 1) times the noise.
+    return robust_std(second) / np.sqrt(6) if len(second) else 0.0

@@ -11,9 +11,11 @@ from ..errors import InputError
 from .regular import MAP, regular
 
 _MAGIC = 20000630
+"""First four bytes, little-endian; like the flags below from OpenEXR's file layout."""
 _LONGEST = 1 << 20
 """Bytes of header that are looked at; cameras write a few thousand."""
 _TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
+"""Bits of the version field: tiles, deep data, several parts."""
 _LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 """Lines of a chunk by the number of the compression; later ones have at most as many."""
 _RATIO = (1, 128, 1032, 1032)
@@ -21,6 +23,8 @@ _RATIO = (1, 128, 1032, 1032)
 _CHUNK = 16
 """Bytes that a chunk takes at least: its offset in the table, its line and its length."""
 _SLACK = 64
+"""Bytes added to the file's size before it is judged: what holds little hardly shrinks.
+Chosen."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator
 
 _SLACK = 4096
+"""Bytes of a text header that are read, and by which a file may seem too short. Chosen: a page."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 _DEFLATE = 1032
 """How much deflate shrinks at most."""
@@ -119,3 +120,4 @@ _READERS = {
     b"MM\0*": _tiff,
     **{b"P%d" % kind: _netpbm for kind in range(1, 7)},
 }
+"""By the first bytes of a file, which its format's specification gives."""

@@ -21,6 +21,7 @@ FORMATS = ("ply", "stl", "obj", "off", "glb")
 LARGEST = 1e9
 """Coordinates, mm: more is no surface, and its squares are no numbers of single precision."""
 _HEAD = 65536
+"""Bytes of a PLY file in which its header is sought. Chosen: headers take some hundred."""
 _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4,
           "double": 8, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4,
           "float32": 4, "float64": 8}  # fmt: skip

@@ -23,6 +23,7 @@ _BROKEN = (
 )  # fmt: skip
 """What zipfile and NumPy raise for damaged files, whose headers are Python literals."""
 _ENCRYPTED = 0x1
+"""Bit 0 of the general purpose flags in ZIP's specification."""
 _HEADER = 10_000
 """Characters of an array's header; ours have a hundred."""
 

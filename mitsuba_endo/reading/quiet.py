@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 
 _STDERR = 2
+"""File descriptor, by POSIX."""
 _lock = threading.RLock()
 
 

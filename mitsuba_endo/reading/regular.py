@@ -8,6 +8,7 @@ from pathlib import Path
 from ..errors import InputError
 
 MIB = 1 << 20
+"""Bytes."""
 VARIABLE = "MITSUBA_ENDO_LIMIT_"
 """Environment variables of this name and a kind's, in MiB, replace the kind's limit."""
 

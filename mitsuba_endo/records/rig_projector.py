@@ -12,6 +12,7 @@ from .validation import Length, Matrix3, Real, Record, Size, Vector2, Vector3
 
 AUTO_LAW = "auto"
 MAX_PROJECTOR_DISTORTION = 5
+"""Coefficients of Brown's model: k1, k2, p1, p2, k3."""
 
 
 class Focal(Record):

@@ -24,6 +24,7 @@ Vector3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 INTERVAL = 1.96
 """Standard deviations on each side of a 95 % interval."""
 SCHEMA = 1
+"""Version of solution.json; there has been no other."""
 
 
 class Outcome(StrEnum):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robust import robust_std
 from .cells import SIDE, Image, Links, blend
 from .options import RefineOptions
 from .pattern_image import PatternImage
@@ -39,6 +40,7 @@ uneven tails that would pull on a pattern as wide; the narrower one looks at the
 BLURS = (0.3, 3.0)
 """Between them the blur lies, pattern pixels."""
 FIRST_BLUR = 0.6
+"""Blur of the pattern before it is fitted, pattern pixels. Chosen within :data:`BLURS`."""
 FITTED = 2
 """Iterations after which the blur is fitted."""
 
@@ -143,7 +145,7 @@ def relative_residual(frame: Comparison, predicted: Image) -> Image:
 def residual_scale(frame: Comparison, predicted: Image) -> float:
     """Return the robust standard deviation of the relative residual."""
     used = relative_residual(frame, predicted)[frame.usable > 0]
-    return max(1.4826 * float(np.median(np.abs(used[::7]))), 1e-4) if used.size else FIRST_SCALE
+    return max(robust_std(used[::7]), 1e-4) if used.size else FIRST_SCALE
 
 
 def robust_weight(frame: Comparison, predicted: Image, scale: float) -> Image:

@@ -28,6 +28,7 @@ COLUMNS = (
 """Field and powers of x and y of each column; the image last. The displacement is eliminated last,
 so that what is left of its rows is its information with gain and offset free."""
 OFFSET, GAIN, SHIFT, IMAGE = 0, 3, 6, 8
+"""First of :data:`COLUMNS` of each kind."""
 
 Floats = NDArray[np.float64]
 

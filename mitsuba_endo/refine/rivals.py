@@ -19,7 +19,8 @@ FARTHEST = 0.125
 """Share of the pattern's smaller side within which rivals are sought: farther slips do not happen
 pixel by pixel."""
 BLUR = 0.6
-"""Pattern pixels."""
+"""Blur of the patterns that are compared, pattern pixels. Chosen: that with which a refinement
+begins."""
 WIDER = 2.0
 """Windows of the comparison over those of the regression: they must hold some of the code."""
 

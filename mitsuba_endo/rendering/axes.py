@@ -15,6 +15,7 @@ from ..geometry.arrays import Array
 from ..geometry.transforms import RigidTransform
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
+"""About z, from OpenCV's axes (x right, y down) to Mitsuba's (x left, y up)."""
 _RIGID_TOLERANCE = 1e-4  # Mitsuba stores poses in single precision
 
 

@@ -12,23 +12,26 @@ from ..records.rig import Camera, Rig
 from .finding import Finding
 
 MIN_FIELD_DEG = 10.0
+"""Degrees over the wider side. Chosen: below are telephoto lenses."""
 MAX_FIELD_DEG = 170.0
-"""Over the longer side: wider than any lens without a fisheye's model."""
+"""Degrees over the wider side: more than any lens has without a fisheye's model. Chosen."""
 MAX_WIDE_FIELD_DEG = 220.0
 """The same for all other models."""
 MAX_FOCAL_MM = 60.0
 """Longest focal length in mm of lenses before a machine's or an endoscope's sensor."""
 MM_FIELD_DEG = 150.0
-"""Field from which so small a focal length is more likely in mm than in pixels."""
+"""Degrees from which so small a focal length is more likely in mm than in pixels. Chosen."""
 IMPOSSIBLE_FIELD_DEG = 175.0
+"""Degrees, without a fisheye's model: the image would be 46 focal lengths wide, 2 tan 87.5."""
 OTHER_SIZE = (0.75, 1.3)
 """Side of the image that the principal point is the middle of, over that of the given one, mean of
 both axes: within, a principal point may just be off the middle; usual ratios are 2/3 and 4/3."""
 ALIKE = 0.2
 """Difference of the logarithms of both axes' ratios up to which it is one ratio."""
 NEAR_BORDER = 0.1
+"""Share of the image's side, from its border. Chosen."""
 FAR_FROM_MIDDLE = 0.25
-"""Shares of the image's side."""
+"""Share of the image's side from its middle, from which a crop is likely. Chosen."""
 FITTING = "give that of images of just this size: scale it with the image, shift it with a crop"
 
 

@@ -10,6 +10,7 @@ from ..records.correspondence import CorrespondenceMap
 from .finding import Finding, frames_named
 
 MIN_PIXELS = 30
+"""Pixels that a map must have to be judged, and that hold a repeated value at least. Chosen."""
 MIN_SHARE = 0.01
 """Share of a map's correspondences from which a repeated coordinate is looked at."""
 MIN_COMPONENT_SHARE = 0.05

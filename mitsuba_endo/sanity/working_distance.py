@@ -6,8 +6,9 @@ from ..records.rig import Rig
 from .finding import Finding
 
 BASELINE_MM = (0.5, 5000.0)
+"""Least and greatest baseline that is plausible. Chosen: within a tip, across a hall."""
 DISTANCE_MM = (5.0, 20000.0)
-"""From a microendoscope before tissue to a projector in a hall."""
+"""The same of the surface's distance. Chosen: from a tip before tissue to a hall."""
 _UNITS = {1000.0: "metres", 10.0: "centimetres", 0.001: "micrometres"}
 
 

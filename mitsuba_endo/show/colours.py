@@ -14,8 +14,11 @@ DEPTH = "cividis"
 CAMERA, PROJECTOR = "#0072b2", "#d55e00"  # of Okabe and Ito's colour-blind safe palette
 
 _STEPS = 1024
+"""Entries of a colour map. Chosen: borders of bands are then right to a thousandth of the range."""
 _BANDS = 14
+"""Bands wished for; round steps make them some more or fewer. Chosen for looks."""
 _SHADE = 0.72
+"""Brightness of every second band over that of the others. Chosen for looks."""
 
 
 def round_step(extent: float, parts: int) -> float:

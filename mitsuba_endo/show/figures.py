@@ -22,8 +22,10 @@ from .solution_values import headline, unit_name
 from .view import SurfaceView
 
 DPI = 110
+"""Pixels per inch of a picture. Chosen for looks."""
 _PANEL_AREA = 13.0  # square inches of image in a panel
 _MAX_COLUMNS = 4
+"""Panels beside one another. Chosen for looks."""
 _MAX_NUMBERED = 14
 """Unknowns up to which a correlation matrix has room for its numbers."""
 

@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 REACH = 0.4
 """Length of the drawn frusta over the surface's distance."""
 _AXIS = np.array([[0.0, 0.0, 1.0]])
+"""(1, 3) direction of a device's optical axis, z."""
 _PARALLEL = 1e-4
 """Sine of the angle between two rays below which they meet nowhere that could be drawn."""
 

@@ -9,9 +9,11 @@ from ..decoding.grid.decode import DecodedGrid
 WIDTH = 1200
 """Least width of the picture, pixels; the image is enlarged by a whole factor."""
 DIMMED = 0.55
+"""Brightness of the image under the grid's lines, of full scale. Chosen for looks."""
 COLOURS = ((178, 114, 0), (0, 159, 230), (115, 158, 0), (167, 121, 204))
 """Blue, orange, green, purple (B, G, R) of Okabe and Ito's palette, in turn from line to line."""
 REFUSED = (235, 235, 235)
+"""Light grey (B, G, R): links and nodes that were not assigned."""
 LABELLED = 8
 """Every so many columns and rows a node is labelled with them."""
 FINE = 16

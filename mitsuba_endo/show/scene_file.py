@@ -13,7 +13,9 @@ from ..rendering import keys
 from ..rendering.axes import to_world_from_pose
 
 _SQUARES_PX = 16
+"""Side of the projected squares, pattern pixels. Chosen for looks."""
 _SAMPLES = 16
+"""Samples per pixel. Chosen for a quick first picture; whoever renders the file sets more."""
 
 
 def save_scene(

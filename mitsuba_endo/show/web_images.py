@@ -21,8 +21,11 @@ from .panels import coordinate_limits, residual_range
 _PIXELS = 5_000_000
 """Of all maps together: keeps the page below 3 MB whatever the number of frames."""
 _MAX_SIDE = 640
+"""Pixels of a map's longer side. Chosen, as is the quality, for pages of few MB."""
 _QUALITY = 85
+"""Of WebP, 0 to 100."""
 _FIGURE_DPI = 96
+"""Pixels per inch, as CSS defines its inch."""
 
 
 @dataclass(frozen=True)

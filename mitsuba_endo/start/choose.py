@@ -7,6 +7,7 @@ import numpy as np
 
 from mitsuba_endo.geometry.laws import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
+from mitsuba_endo.robust import robust_std
 
 from .correspondences import Correspondences
 from .propose import facing, planar_poses, same_pose
@@ -15,17 +16,23 @@ from .result import Candidate
 from .vectors import Vectors
 
 GRADUATED_PX = (20.0, 5.0, 1.0)
-"""Cauchy scales, coarse to fine: a wide one bridges wrong starts, a narrow one ignores outliers."""
+"""Cauchy scales, pattern pixels, coarse to fine: a wide one bridges wrong starts, a narrow one
+ignores outliers."""
 REDESCENDING = 2.0
 """Geman-McClure scale of the finish over the robust residual scale: a Cauchy loss alone leaves
 -0.3 to -0.5 % in f under 30 % outliers."""
 MIN_IN_FRONT = 0.99
+"""Share of a calibration's inliers in front of camera and projector. Chosen: noise may put some of
+the farthest behind."""
 MIN_SCALE_PX = 0.02
+"""Least scale of residuals, pattern pixels: maps without noise would leave a loss without any.
+Chosen: far below a decoder's noise."""
 EXPLAINED = 1.5
 """Residuals within this many times the map's own noise are explained."""
 HOPELESS = 4.0
 """Times the cost of a state that explains the data: not refined further."""
 FINALISTS = 3
+"""Minima of similar cost that are finished. Chosen: the best, a plane's twin, and one more."""
 _PATIENT = 200
 """Steps towards a minimum that is reported; valleys of weak relief take a hundred."""
 SIMILAR_COST = 1.2
@@ -65,8 +72,8 @@ class Minimum:
 
 
 def robust_scale(state: EpipolarState) -> float:
-    """Return 1.4826 times the median absolute residual, pattern pixels."""
-    return max(MIN_SCALE_PX, 1.4826 * float(np.median(np.abs(state.r))))
+    """Return the robust standard deviation of the residuals, pattern pixels."""
+    return max(MIN_SCALE_PX, robust_std(state.r))
 
 
 def refine(

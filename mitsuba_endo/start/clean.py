@@ -4,7 +4,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_endo.robust import robust_std
+
 MEDIAN_SIZE = 5
+"""Pixels along the window's side: the most that OpenCV's filter takes of single precision."""
 OUTLIER_PX = 2.0
 """A pixel farther than this from its 5x5 median is dropped."""
 JUMP_PX = 4.0
@@ -31,7 +34,7 @@ def clean_map(q: NDArray[np.float64]) -> NDArray[np.bool_]:
     smooth = median_filter(q, seen)
     off = np.abs(np.where(seen[..., None], q, smooth) - smooth).max(-1)
     # Noisy maps scatter around their median: the bound grows with the scatter.
-    bound = max(OUTLIER_PX, 5 * 1.4826 * float(np.median(off[seen])))
+    bound = max(OUTLIER_PX, 5 * robust_std(off[seen]))
     return large_patches(smooth, seen & (off <= bound))
 
 
@@ -45,7 +48,7 @@ def noise_scale(q: NDArray[np.float64], usable: NDArray[np.bool_]) -> float:
     triple = usable[:, :-2] & usable[:, 1:-1] & usable[:, 2:]
     if not triple.any():
         return 0.0
-    return 1.4826 * float(np.median(np.abs(second[triple]))) / np.sqrt(6)
+    return robust_std(second[triple]) / np.sqrt(6)
 
 
 def median_filter(

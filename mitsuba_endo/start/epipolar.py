@@ -24,6 +24,7 @@ from .vectors import Vectors, cross, dot, skew
 # Central differences of O(1) functions in double precision are best near the cube root of epsilon.
 _LAW_STEP = 6e-6
 _LOG_FOCAL_STEP = 1e-6
+"""Forward difference: it errs by some 1e-6 of itself, and by 1e-7 from :data:`_UNDISTORTED`."""
 _UNDISTORTED = 1e-13  # residual of normalised coordinates, a few rounding errors
 
 

@@ -33,7 +33,9 @@ from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
 HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Centres tried first, of the pattern's height: lens shifts of up to 75 %, upwards or downwards."""
 MIDDLE = 0.5
+"""That of a lens without shift, of the pattern's height."""
 FINALISTS = 2
+"""Heights, best first, from which the descent starts. Chosen."""
 CANDIDATES = 4
 """Poses refined at each centre."""
 BETTER = 0.95
@@ -42,7 +44,10 @@ middle loses less than 1 % to chance, the samples' paired spread."""
 _REACH = (0.3, 0.1)
 """Of the pattern's height: how far each round of the descent looks to either side."""
 _EVALUATIONS = 18
+"""Heights tried in a round. A golden section needs 18 from 0.6 of 800 pattern pixels down to 0.1,
+where it ends."""
 _PATIENT = 60
+"""Steps of pose and focal length at a height. Chosen: three times the usual."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,17 +11,22 @@ from .similarity import Similarities
 STARTS = 512
 """Random motions tried."""
 MAX_TURN = np.radians(18)
-"""Largest rotation among the starts."""
+"""Largest rotation among the starts, radians: neighbouring frames are up to 15 degrees apart."""
 MAX_SHIFT = 0.5
 """Largest translation among the starts, relative to the typical range."""
 STAGES = ((0.05, 5, 200, 48), (0.03, 5, 400, 12), (0.02, 6, 1000, 6))
 """Scale of the loss relative to the typical range, steps, points, survivors."""
 FINAL_SCALES = (0.015, 0.01)
+"""Scales of the loss on the fine images, relative to the typical range. Chosen: those of the stages
+go on."""
 FINAL_STEPS = 6
+"""Gauss-Newton steps at each of them. Chosen."""
 SAME_TURN, SAME_SHIFT = 0.05, 0.05
-"""Candidates nearer to one another than this have reached, or will reach, the same minimum."""
+"""Radians and typical ranges: candidates nearer to one another have reached, or will reach, one
+minimum."""
 WANDERED_TURN, WANDERED_SHIFT = np.radians(45), 1.0
-"""Candidates that drifted farther than this from no motion have left the range of the search."""
+"""Radians and typical ranges: candidates that drifted farther from no motion have left the range of
+the search."""
 MIN_CANDIDATE_OVERLAP = 0.1
 """Share of the points that must find a partner for a candidate to count at all."""
 

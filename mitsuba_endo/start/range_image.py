@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 MIN_COSINE = 0.12
 """Surface seen more obliquely than this (83 degrees) is taken for a depth edge."""
 MAX_SPREAD = 0.08
-"""Ranges in one block that spread more than this about their mean lie across a depth edge."""
+"""Standard deviation over mean of the ranges in one block: above, it lies across a depth edge."""
 COARSE_COLUMNS, FINE_COLUMNS = 54, 110
 """Columns to which images are averaged."""
 MIN_POINTS = 50

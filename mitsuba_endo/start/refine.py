@@ -10,6 +10,7 @@ from mitsuba_endo.geometry.transforms import (
     rotation_from_vector,
     tangent_basis,
 )
+from mitsuba_endo.robust import robust_std
 
 from .correspondences import Correspondences
 from .epipolar import Bearings, Residuals, bearings, jacobian, residuals
@@ -18,6 +19,8 @@ from .vectors import Vectors
 _OUT_OF_RANGE_PX = 1e3  # residual of a coordinate that the law cannot produce at the tried focal
 _STEP_TOLERANCE = 1e-7  # radians, and relative focal length
 _COST_TOLERANCE = 1e-7
+"""Relative fall of the cost in a step, and a tenth of the predicted one, at which a descent ends.
+Chosen."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def minimise(
 def focal_deviation(state: EpipolarState, data: Correspondences, loss: EpipolarLoss) -> float:
     """Return the formal standard deviation of log focal: (J^T W J)^-1 times the noise variance."""
     hessian, _ = _normal_equations(state, data, loss, True)
-    noise = 1.4826 * float(np.median(np.abs(state.r)))
+    noise = robust_std(state.r)
     # Scaling to a unit diagonal keeps the inverse meaningful for a nearly singular matrix.
     d = 1 / np.sqrt(np.diag(hessian) + 1e-300)
     scaled = np.linalg.pinv(hessian * np.outer(d, d), rcond=1e-15, hermitian=True)

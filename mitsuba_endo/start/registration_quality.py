@@ -4,6 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from mitsuba_endo.robust import robust_std
+
 from .icp import Match, jacobian, match, sample
 from .range_image import RangePyramid
 from .similarity import Similarities
@@ -14,7 +16,9 @@ from .similarity import Similarities
 GATE_SCALE = 0.02
 """Scale of the loss when placements are judged: points 4 mm off at 70 mm are not partners."""
 MAX_RESIDUAL = 0.008
+"""Relative to the typical range; see above: between right and wrong placements."""
 MIN_RUNNER_UP = 1.7
+"""Score of the next placement over that of the best; see above."""
 MIN_OVERLAP = 0.3
 """Sum of the shares of either frame's points that have a partner in the other."""
 MAX_DISAGREEMENT = 0.4
@@ -22,6 +26,7 @@ MAX_DISAGREEMENT = 0.4
 MAX_WEAKNESS = 0.02
 """Standard deviation in the worst-determined direction, radians or relative to the range."""
 JUDGED_POINTS = 2500
+"""Points of a frame on which placements are judged. Chosen."""
 INDEPENDENT_POINTS = 100
 """Residuals are smooth: an image counts as about this many independent ones."""
 
@@ -97,9 +102,9 @@ def judge(
 
 
 def _residual(found: Match) -> float:
-    """Return 1.4826 times the median distance; points in common view without partner are far."""
-    distance = np.where(found.partner, np.abs(found.residual), 1.0)[found.seen]
-    return 1.4826 * float(np.median(distance)) if distance.size else np.inf
+    """Return the robust standard deviation; points in common view without partner are far."""
+    distance = np.where(found.partner, found.residual, 1.0)[found.seen]
+    return robust_std(distance) if distance.size else np.inf
 
 
 def _weakness(found: Match, residual: float) -> float:

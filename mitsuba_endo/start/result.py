@@ -38,7 +38,7 @@ class Start:
     used: NDArray[np.bool_]
     """(H, W) correspondences kept by the cleaning and the robust fit."""
     scale_px: float
-    """Robust scale of the epipolar residuals (1.4826 median absolute deviation), pattern pixels."""
+    """Robust standard deviation of the epipolar residuals, pattern pixels."""
     notes: list[str] = field(default_factory=list)
     """What the user should know: nearly planar data, a twin pose, a focal length the data do not
     determine."""

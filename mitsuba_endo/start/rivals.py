@@ -28,7 +28,10 @@ from .refine import EpipolarLoss, evaluate, minimise
 SAMPLE = 4000
 """Correspondences that are looked at; twins differ in all of them."""
 _PROPOSALS = 4
+"""Poses that compete beside the given one. Chosen."""
 _FOCAL_FACTOR = 6.0
+"""By which a rival's focal length may be greater or smaller. Chosen: the ladder of proposals spans
+a factor of 9."""
 
 
 @dataclass(frozen=True, eq=False)

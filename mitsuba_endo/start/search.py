@@ -24,10 +24,13 @@ from .refine import evaluate
 from .result import Start
 
 FINISH_POINTS = 40_000
+"""Correspondences on which the best minima are finished. Chosen."""
 CANDIDATES = 8
+"""Distinct proposals that are refined. Chosen."""
 MAX_SCALE = 0.02
 """Residuals above this share of the pattern's width mean that no calibration was found."""
 MIN_EXTENT_PX = 2.0
+"""Pattern pixels that a map must span: one that was normalised to 0..1 spans one."""
 
 
 def search_start(

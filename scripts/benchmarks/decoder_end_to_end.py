@@ -15,6 +15,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig, Scale
+from mitsuba_endo.robust import robust_std
 from mitsuba_endo.shapes import Mesh
 from mitsuba_endo.solve.calibrate import calibrate
 
@@ -82,7 +83,7 @@ def judge(kind: Kind, mesh: Mesh, shots: Sequence[Shot], network: Network) -> li
 
 def _noise(q: NDArray[np.float32], shot: Shot) -> float:
     error = (q - shot.q)[np.isfinite(q[..., 0]) & shot.lattice_known]
-    return 1.4826 * float(np.median(np.abs(error)))
+    return robust_std(error)
 
 
 def _noisy(shot: Shot, noise: float, spread: float, seed: int) -> CorrespondenceMap:

@@ -46,9 +46,8 @@ def calibration_bound(truth: Truth, points: Floats, sigma: float) -> dict[str, f
     ]
     J = np.array(rows).T / sigma
     variance = np.diag(np.linalg.inv(J.T @ J))
-    degrees = 180 / np.pi
     return {
         "focal": 100 * float(np.sqrt(variance[0])),
-        "rotation": degrees * float(np.sqrt(variance[1:4].sum())),
-        "direction": degrees * float(np.sqrt(variance[4:].sum())),
+        "rotation": float(np.degrees(np.sqrt(variance[1:4].sum()))),
+        "direction": float(np.degrees(np.sqrt(variance[4:].sum()))),
     }

@@ -132,10 +132,9 @@ def in_channel(
     ``play`` scales the spread: 0.5 mm along the axis and 0.15 mm across, 2 degrees about the axis
     and 0.6 degrees of it, which a thin instrument in a wider channel has.
     """
-    degree = np.pi / 180
     return [at] + [
         RigidTransform.of(
-            rng.normal(0, play * degree * np.array([0.6, 0.6, 2.0])),
+            rng.normal(0, play * np.radians([0.6, 0.6, 2.0])),
             rng.normal(0, play * np.array([0.15, 0.15, 0.5])),
         )
         @ at

@@ -33,6 +33,7 @@ from .tracks import Sightings, sightings
 _PIXEL_CENTRE = 0.5
 """COLMAP's first pixel spans 0 to 1; here its centre is 0."""
 _FULL_OPENCV = 8
+"""Coefficients of COLMAP's model of that name: k1, k2, p1, p2, k3 to k6."""
 _MODELS = {"opencv": "FULL_OPENCV", "opencv_fisheye": "OPENCV_FISHEYE"}
 _COEFFICIENTS = {"FULL_OPENCV": _FULL_OPENCV, "OPENCV_FISHEYE": 4}
 

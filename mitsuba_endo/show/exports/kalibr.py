@@ -28,6 +28,7 @@ _MODELS = {
 _LEADING = {"omni": ("omni", 1), "double_sphere": ("ds", 2)}
 """Kalibr's camera model, and how many coefficients it takes into ``intrinsics``."""
 _LENS = 4
+"""Coefficients of each of Kalibr's distortion models."""
 
 
 @register_exporter("kalibr", "camchain.yaml with camera and projector; pinhole projectors only")

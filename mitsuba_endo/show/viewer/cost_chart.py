@@ -11,6 +11,8 @@ from ..colours import CAMERA, PROJECTOR, UNUSED
 from .nodes import small
 
 _WHOLE = tuple(digit * 10.0**power for power in range(4) for digit in (1, 2, 5))
+"""1, 2, 5, 10, ... 5000 iterations between marks of the axis, because iterations
+are whole."""
 Data = tuple[NDArray[np.float64], ...]
 NOTE = (
     "Blue: robust cost per correspondence, in units of the robust scale, and so it jumps where "

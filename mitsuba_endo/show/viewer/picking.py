@@ -8,6 +8,7 @@ from ..measure import SurfacePoint, distance, pick
 from ..result_scene import ResultScene
 
 MARK = (204, 0, 102)
+"""Magenta (R, G, B). Chosen for looks."""
 HINT = "Tick, then click two points on the surface."
 
 

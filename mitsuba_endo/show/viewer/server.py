@@ -18,6 +18,7 @@ from .guard import QUERY, Guard, guarding, without_sharing
 TITLE = "mitsuba-endo"
 _TAKEN = (errno.EADDRINUSE, errno.EACCES)
 _LAST_PORT = 65535
+"""Of TCP, whose ports have 16 bits."""
 _TOKEN = "mitsuba_endo_token"
 """Attribute of a server: what :func:`address` adds."""
 

@@ -18,6 +18,7 @@ from .nodes import Nodes, rgb_bytes
 TRUTH = "#3a3a3a"
 COARSE = "#9fb4c4"
 _TEXELS = 256
+"""Colours of a scale. Chosen: as many as a channel of 8 bits has levels."""
 
 
 class ViserScene:

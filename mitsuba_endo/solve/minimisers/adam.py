@@ -28,6 +28,7 @@ Floats = NDArray[np.float64]
 SURFACE_RATE = 3e-3
 """First learning rate of the surfaces' values: motion of a vertex relative to its distance."""
 MEAN_DECAY = 0.95
+"""Share of the gradients' running mean that an iteration keeps; Adam's usual is 0.9. Chosen."""
 SQUARE_DECAY = 0.99
 """Gradients fall by orders of magnitude on the way down; Adam's usual 0.999 would remember the
 first ones for thousands of iterations and all but stop."""

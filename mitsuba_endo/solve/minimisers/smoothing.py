@@ -17,6 +17,7 @@ _WEIGHT = 0.25
 """Weight of the reported surface's prior per observation: on random bumpy sheets and on a folded
 stomach wall the shape is best between 0.1 and 0.5."""
 _ITERATIONS = 10
+"""Steps at most. Chosen: only the surface moves, from where a weaker prior left it."""
 
 
 def smooth_surfaces(result: OptimisationResult, options: Options) -> OptimisationResult:

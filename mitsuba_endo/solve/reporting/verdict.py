@@ -86,7 +86,7 @@ def _pose(name: str, pose: PoseEstimate, unit: str) -> list[str]:
         return [f"{name}: given and not estimated."]
     if pose.R is None or pose.t is None or pose.std is None:
         return [f"{name}: not determined; {pose.reason}."]
-    angle = INTERVAL * max(pose.std[:3]) * float(np.degrees(1.0))
+    angle = float(np.degrees(INTERVAL * max(pose.std[:3])))
     length = INTERVAL * max(pose.std[3:])
     t = ", ".join(f"{x:.4g}" for x in pose.t)
     weak = f"; only weakly determined, {pose.reason}" if pose.status == "weak" else ""

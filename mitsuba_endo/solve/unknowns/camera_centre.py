@@ -10,7 +10,7 @@ from ...rendering.coordinates import FrameModel
 from .block import Floats, NaturalScales, Value, VectorBlock, register_block
 
 _STD_PX = 1.0
-"""Of a careful calibration."""
+"""Of a careful calibration, camera pixels."""
 
 
 @register_block

@@ -12,7 +12,7 @@ from .block import Floats, Value, VectorBlock, register_block
 
 _STD = {"k1": 0.005, "k2": 0.01, "p1": 0.001, "p2": 0.001}
 _OTHER_STD = 0.01
-"""Of a careful calibration."""
+"""Of a careful calibration; a coefficient has no unit."""
 
 
 @register_block

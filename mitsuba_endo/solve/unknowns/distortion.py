@@ -14,7 +14,7 @@ _LEAST_TERMS = 2
 """Coefficients that are unknowns where the rig names none: k1 and k2."""
 
 _STD = (0.005, 0.01, 0.001, 0.001, 0.01)
-"""Of a careful calibration."""
+"""Of a careful calibration, of k1, k2, p1, p2, k3; they have no unit."""
 
 
 @register_block
