@@ -23,22 +23,24 @@ def run(rig: Rig, options: Options | None = None, **changes: Any) -> Calibration
 
 
 def check(found: Calibration, rig: Rig, deviations: float = 5) -> None:
-    """Compare with the truth in units of the stated standard deviations."""
+    """Compare with the truth in units of the stated standard deviations, capped by physical limits:
+    neither a large error nor a large stated deviation passes."""
     solution = found.solution
     assert solution.outcome == "converged"
     focal = solution.projector.focal
     if focal.status != "fixed":
         assert focal.status == "measured"
-        assert abs(focal.value - rig.projector.focal) < deviations * focal.std
+        error = abs(focal.value - rig.projector.focal)
+        assert error < min(deviations * focal.std, 3e-3 * rig.projector.focal)
     pose = solution.frames[0].projector_from_camera
     transform = pose.to_transform()
     assert transform is not None
     exact = rig.projector_from_camera
     if pose.status != "fixed":
         angle = rotation_angle(transform.R @ exact.R.T)
-        assert angle < deviations * np.linalg.norm(pose.std[:3])
+        assert angle < min(deviations * np.linalg.norm(pose.std[:3]), 1e-3)
         gap = np.linalg.norm(transform.t - exact.t)
-        assert gap < deviations * np.linalg.norm(pose.std[3:])
+        assert gap < min(deviations * np.linalg.norm(pose.std[3:]), 0.02 * rig.baseline)
     height, width = rig.depth.shape
     pixels = rig.camera.project(found.surface.vertices)
     x, y = np.round(pixels).astype(int).T
@@ -52,7 +54,8 @@ def check(found: Calibration, rig: Rig, deviations: float = 5) -> None:
 @pytest.mark.usefixtures("llvm")
 @pytest.mark.parametrize("law", LAWS)
 class TestOneFrame:
-    """Oracle: the truth of a ray-cast rig, within five stated standard deviations."""
+    """Oracle: the truth of a ray-cast rig, within five stated standard deviations and 0.3 % of the
+    focal length, a milliradian and 2 % of the baseline."""
 
     def test_distorted_projector_with_oblong_pixels(self, law: str):
         rig = small_rig(law, aspect=1.2, distortion=BrownDistortion((0.08, -0.05, 0.003, -0.002)))
@@ -91,7 +94,7 @@ class TestOneFrame:
         np.testing.assert_allclose(pose.t, POSE.t, rtol=1e-9)
 
     def test_everything_free_that_can_be(self, law: str):
-        """Oracle: as above; aspect ratio and distortion are unknowns too."""
+        """Oracle: as above; aspect ratio and distortion are unknowns too, to 0.01."""
         rig = small_rig(law, distortion=BrownDistortion((0.05, 0.0)))
         noisy = with_noise(rig, 0.1, 6)
         share = {"aspect": "shared", "distortion": "shared"}
@@ -102,7 +105,7 @@ class TestOneFrame:
         ):  # fmt: skip
             assert estimate.value is not None
             gap = np.atleast_1d(estimate.value) - truth
-            assert (np.abs(gap) < 5 * np.atleast_1d(estimate.std)).all()
+            assert (np.abs(gap) < np.minimum(5 * np.atleast_1d(estimate.std), 0.01)).all()
 
 
 @pytest.mark.usefixtures("llvm")
@@ -221,7 +224,7 @@ class TestSolution:
         alone = run(rigs[0]).solution
         assert [f.name for f in found.frames] == ["0.npz", "1.npz", "2.npz"]
         focal = found.projector.focal
-        assert abs(focal.value - 330) < 5 * focal.std
+        assert abs(focal.value - 330) < min(5 * focal.std, 1e-3 * 330)
         assert focal.std_formal < 0.8 * alone.projector.focal.std_formal
         poses = [f.projector_from_camera.to_transform() for f in found.frames]
         assert all(isinstance(p, RigidTransform) for p in poses)
@@ -239,4 +242,4 @@ def test_frame_focal_lengths_stand_with_the_frames(llvm: str):
     assert found.projector.focal.value is None
     for frame, truth in zip(found.frames, (330, 350), strict=True):
         assert frame.focal is not None
-        assert abs(frame.focal.value - truth) < 5 * frame.focal.std
+        assert abs(frame.focal.value - truth) < min(5 * frame.focal.std, 2e-3 * truth)

@@ -42,14 +42,15 @@ class TestDegenerate:
         assert any("centre" in m for m in mixed)
 
     def test_pinhole_and_hardly_any_relief(self):
-        """Oracle: 0.3 mm of relief; the stated deviation covers the error, and is not small."""
+        """Oracle: 0.3 mm of relief; the stated deviation covers the error, and is neither small nor
+        more than 3 %: the data do tell something."""
         nearly_flat = bumpy_sheet(70, (0.2, -0.15), 0.3, 3)
         focal = calibrated("pinhole", nearly_flat).solution.projector.focal
         assert focal.status == "weak"
         assert isinstance(focal.value, float)
         assert isinstance(focal.std, float)
         assert abs(focal.value - 330) < 3 * focal.std
-        assert focal.std > 3
+        assert 3 < focal.std < 10
 
 
 @pytest.mark.usefixtures("llvm")
