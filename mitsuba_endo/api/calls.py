@@ -8,6 +8,7 @@ from ..records.checkpoint import load_checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.plan import with_plan
 from ..records.rig import load_rig
+from ..refine.image_decoder import ImageDecoder
 from ..rendering.render import Capture, render_capture
 from ..rendering.scene import load_scene
 from ..show.read_folder import read_solution_folder
@@ -81,7 +82,8 @@ def decode(
         InputError: an image that cannot be used, or of another size than the rig's.
         NothingDecodedError: it does not show the pattern.
     """
-    return decode_frame(as_image(image), as_rig(rig), pattern, refine).map
+    decoder = ImageDecoder(as_rig(rig), pattern, refine=refine)
+    return decode_frame(decoder, as_image(image))
 
 
 def render(scene: str | Path, *, spp: int = 64, seed: int = 0, **parameters: Any) -> Capture:

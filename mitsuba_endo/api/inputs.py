@@ -7,15 +7,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decoding.grid.decode import decode_image
 from ..decoding.image_files import ImageFrame, full_scale, is_images, read_frames
-from ..decoding.network import load_network
-from ..decoding.pattern_option import coded_grid
 from ..errors import InputError, NothingDecodedError, shown
 from ..records.correspondence import CorrespondenceMap, load_map
 from ..records.rig import Rig, load_rig
 from ..records.validation import validate
-from ..refine.decoded import DecodedMap, decoded_map
+from ..refine.image_decoder import ImageDecoder
 
 Array: TypeAlias = NDArray[Any]
 FrameInput: TypeAlias = str | Path | Array | CorrespondenceMap
@@ -23,7 +20,6 @@ FrameInput: TypeAlias = str | Path | Array | CorrespondenceMap
 record."""
 RigInput: TypeAlias = str | Path | Mapping[str, Any] | Rig
 """A rig: its file, its contents as they would stand in the file, or its record."""
-DEFAULT_PATTERN = "pattern:coded"
 
 
 def as_rig(rig: RigInput) -> Rig:
@@ -88,25 +84,18 @@ def as_correspondences(
     return _decoded(images, rig, pattern, refine) if images else maps
 
 
-def decode_frame(frame: ImageFrame, rig: Rig, pattern: str | None, refine: bool) -> DecodedMap:
+def decode_frame(decoder: ImageDecoder, frame: ImageFrame) -> CorrespondenceMap:
     """Return the map of an image of the coded grid.
 
     Raises:
-        InputError: an image of another size than the rig's, or an unknown pattern.
+        InputError: an image of another size than the rig's.
         NothingDecodedError: the image does not show the pattern.
     """
-    height, width = frame.image.shape[:2]
-    if (width, height) != (rig.camera.width, rig.camera.height):
-        raise InputError(
-            f"is {width} x {height} pixels and the rig's camera.width x camera.height "
-            f"{rig.camera.width} x {rig.camera.height}",
-            frame.source, "give the rig of the camera that took it",
-        )  # fmt: skip
-    grid = coded_grid(pattern or DEFAULT_PATTERN, rig.projector.width, rig.projector.height)
-    decoded = decode_image(frame.image, load_network(None), grid)
-    if decoded.reason:
-        raise NothingDecodedError(decoded.reason, frame.name, "check the pattern, light and focus")
-    return decoded_map(frame.image, decoded, grid, frame.name, refine=refine)
+    decoded = decoder.decode(frame)
+    if decoded.grid.reason:
+        todo = "check the pattern, light and focus"
+        raise NothingDecodedError(decoded.grid.reason, frame.name, todo)
+    return decoded.map.map
 
 
 def as_image(image: str | Path | Array) -> ImageFrame:
@@ -141,9 +130,10 @@ def _decoded(
     """
     maps: list[CorrespondenceMap] = []
     failure: NothingDecodedError | None = None
+    decoder = ImageDecoder(rig, pattern, refine=refine)
     for frame in read_frames(images):
         try:
-            maps.append(decode_frame(frame, rig, pattern, refine).map)
+            maps.append(decode_frame(decoder, frame))
         except NothingDecodedError as error:
             failure = failure or error
     if not maps and failure is not None:

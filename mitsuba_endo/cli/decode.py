@@ -1,6 +1,6 @@
 """``mitsuba-endo decode``: from images of the coded grid to correspondence maps."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -109,7 +109,7 @@ def decode_into(
     folder: Path,
     images: Sequence[Path],
     rig: "Rig",
-    pattern: str,
+    pattern: str | None,
     weights: Path | None,
     refine: bool,
     output: Session,
@@ -120,22 +120,17 @@ def decode_into(
         InputError: an image that cannot be read or is not of the rig's size, a wrong pattern or
             network.
     """
-    from ..decoding.grid.decode import decode_image
     from ..decoding.image_files import read_frames
-    from ..decoding.network import load_network
-    from ..decoding.pattern_option import coded_grid
-    from ..refine.decoded import decoded_map
+    from ..refine.image_decoder import ImageDecoder
 
-    grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
-    network = load_network(weights)
+    decoder = ImageDecoder(rig, pattern, weights, refine=refine)
     found = []
     with output.progress("Decoding") as advance:
-        for frame in _sized(read_frames(images), rig):
+        for frame in read_frames(images):
             advance(0.0, f"Decoding {frame.name}")
-            result = decode_image(frame.image, network, grid)
-            map_ = decoded_map(frame.image, result, grid, frame.name, refine=refine)
-            found.append(_summary(frame.name, result, map_))
-            _write(folder, frame, result, map_)
+            decoded = decoder.decode(frame)
+            found.append(_summary(frame.name, decoded.grid, decoded.map))
+            _write(folder, frame, decoded.grid, decoded.map)
     return found
 
 
@@ -175,7 +170,7 @@ def decode_images(
     if len(images) < len(paths):
         raise InputError("maps and images are given", str(images[0]), "give one kind")
     rig = load_rig(rig_file)
-    found = decode_into(aside, images, rig, pattern or DEFAULT, None, refine, output)
+    found = decode_into(aside, images, rig, pattern, None, refine, output)
     refuse_nothing(found)
     output.print(*(one.line() for one in found))
     return [map_path(aside, one.name) for one in found if not one.reason]
@@ -198,20 +193,6 @@ def refuse_nothing(found: Sequence[Summary]) -> None:
 def map_path(folder: Path, frame: str) -> Path:
     """Return where the map of a frame is written."""
     return folder / f"{frame}.exr"
-
-
-def _sized(frames: "Iterator[ImageFrame]", rig: "Rig") -> "Iterator[ImageFrame]":
-    from ..errors import InputError
-
-    for frame in frames:
-        height, width = frame.image.shape[:2]
-        if (width, height) != (rig.camera.width, rig.camera.height):
-            raise InputError(
-                f"is {width} x {height} pixels and the rig's camera.width x camera.height "
-                f"{rig.camera.width} x {rig.camera.height}",
-                frame.source, "give the rig of the camera that took it",
-            )  # fmt: skip
-        yield frame
 
 
 def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid", map_: "DecodedMap") -> None:

@@ -12,9 +12,8 @@ from ..reading.regular import MAP, regular
 from ..records.correspondence import SUFFIXES as MAPS
 from ..records.correspondence import load_map
 from ..records.rig import Rig
+from ..refine.image_decoder import ImageDecoder
 from .frames import Incoming, Unread
-
-PATTERN = "pattern:coded"
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def frames_of(
         raise InputError("maps and images are given", str(maps[0]), "give one kind")
     if not maps:
         images = islice(read_frames(files), chosen.start, chosen.end, chosen.stride)
-        return _decoded(images, rig, pattern or PATTERN, refine), None
+        return _decoded(images, rig, pattern, refine), None
     for name, given in (("--pattern", pattern is not None), ("--no-refine", not refine)):
         if given:
             raise InputError("is for images, and maps are given", name, "leave it out")
@@ -97,29 +96,12 @@ def _loaded(files: Sequence[Path]) -> Iterator[Incoming]:
 
 
 def _decoded(
-    images: Iterator[ImageFrame], rig: Rig, pattern: str, refine: bool
+    images: Iterator[ImageFrame], rig: Rig, pattern: str | None, refine: bool
 ) -> Iterator[Incoming]:
-    from ..decoding.grid.decode import decode_image
-    from ..decoding.network import load_network
-    from ..decoding.pattern_option import coded_grid
-    from ..refine.decoded import decoded_map
-
-    grid = coded_grid(pattern, rig.projector.width, rig.projector.height)
-    network = load_network(None)
+    decoder = ImageDecoder(rig, pattern, refine=refine)
     for frame in images:
-        _check_size(frame, rig)
-        result = decode_image(frame.image, network, grid)
-        if result.reason:
-            yield Unread(frame.name, result.reason)
-            continue
-        yield decoded_map(frame.image, result, grid, frame.name, refine=refine).map
-
-
-def _check_size(frame: ImageFrame, rig: Rig) -> None:
-    height, width = frame.image.shape[:2]
-    if (width, height) != (rig.camera.width, rig.camera.height):
-        raise InputError(
-            f"is {width} x {height} pixels and the rig's camera.width x camera.height "
-            f"{rig.camera.width} x {rig.camera.height}",
-            frame.source, "give the frames of one camera, and its rig",
-        )  # fmt: skip
+        decoded = decoder.decode(frame)
+        if decoded.grid.reason:
+            yield Unread(frame.name, decoded.grid.reason)
+        else:
+            yield decoded.map.map

@@ -162,7 +162,7 @@ def test_images_of_changing_size_are_refused(folder: Path, tmp_path: Path) -> No
     write_png(tmp_path / "a1.png", np.zeros((90, 160, 3), np.uint8))
     line = _refused(folder, tmp_path)
     assert "a1.png: is 160 x 90 pixels" in line
-    assert "give the frames of one camera" in line
+    assert "give the rig of the camera that took it" in line
 
 
 def test_images_without_the_pattern_are_refused(folder: Path, tmp_path: Path) -> None:
