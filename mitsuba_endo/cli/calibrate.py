@@ -61,8 +61,8 @@ SurfaceKind = Annotated[
 CheckModel = Annotated[
     bool,
     typer.Option(
-        "--check-model",
-        help="Test the model against its residuals and name what is wrong (tried on few rigs).",
+        "--check-model/--no-check-model",
+        help="Test the model against its residuals, name what may be wrong, and widen intervals.",
     ),
 ]
 Start = Annotated[
@@ -110,7 +110,7 @@ def calibrate(
     solver: Solver = "levenberg-marquardt",
     surface: SurfaceKind = "lattice",
     start: Start = "search",
-    check_model: CheckModel = False,
+    check_model: CheckModel = True,
     share: Share = None,
     seed: Seed = 0,
     resume: Resume = None,

@@ -2,6 +2,7 @@
 
 import json
 from html import escape
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -42,17 +43,23 @@ def model(solution: Solution) -> str:
     if not found.get("suspected"):
         return ""
     lines = "".join(
-        f"<tr><th>{escape(c['words'])}</th><td>{c['value']:+.3g} ± {c['std']:.2g} "
-        f"{escape(c['unit'])}</td><td>{100 * c['share']:.0f} %</td>"
-        f"<td>{escape(', '.join(c['group']))}</td></tr>"
+        f"<tr><th>{escape(c['words'])}</th><td>{escape(_off_by(c))}</td>"
+        f"<td>{100 * c['share']:.0f} %</td><td>{escape(', '.join(c['group']))}</td></tr>"
         for c in found["candidates"]
     )
     return (
         f"<h3>Model</h3><p>Structure of the residuals {found['structure']:.2f}, of noise "
-        f"{found['expected']:.2f}; intervals are {found['intervals_by']:.1f} times as wide as "
-        "noise alone would make them.</p><table><tr><th>May be wrong</th><th>By</th>"
+        f"{found['expected']:.2f}; their correlation makes intervals {found['intervals_by']:.1f} "
+        "times as wide as independent noise would.</p><table><tr><th>May be wrong</th><th>By</th>"
         f"<th>Explains</th><th>Looks like</th></tr>{lines}</table>"
     )
+
+
+def _off_by(candidate: dict[str, Any]) -> str:
+    """Say by how much a value is off; nothing for several together."""
+    if candidate["value"] is None or candidate["std"] is None:
+        return ""
+    return f"{candidate['value']:+.3g} ± {candidate['std']:.2g} {candidate['unit']}"
 
 
 def given(solution: Solution) -> str:

@@ -36,8 +36,8 @@ class Options:
     """Loss of the last stage: redescending, or Cauchy as published."""
     seed: int = 0
     """Of the random samples in the search for a start."""
-    check_model: bool = False
-    """Whether to test the model against its residuals, name what of it is wrong, and carry that
-    into estimates and intervals. Off until its intervals are shown to hold on more rigs."""
+    check_model: bool = True
+    """Whether to test the model against its residuals, name what of it may be wrong, and carry that
+    into the intervals. Estimates stay as they are."""
     jackknife: bool = True
     """Whether to compute block-jackknife standard deviations."""

@@ -241,11 +241,12 @@ def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
 
 def infer(job: Job, done: Optimised, say: Progress) -> Fit:
     """Smooth the surface to be reported and tell how well everything is known."""
-    say(0.0, "Computing standard deviations")
     result, model = done.result, None
     if job.options.check_model:
+        say(0.0, "Testing the model")
         with job.timed("model"):
-            result, model = check_model(done.result, job.rig, job.options)
+            model = check_model(result, job.rig)
+    say(0.5, "Computing standard deviations")
     with job.timed("surface"):
         reported = smooth_surfaces(result, job.options)
     with job.timed("uncertainty"):
@@ -253,5 +254,5 @@ def infer(job: Job, done: Optimised, say: Progress) -> Fit:
     if model is not None:
         model = replace(model, understated=max(known.sigma / result.noise.sigma, 1.0))
     given, notes = [m.name for m in job.maps], [*job.notes, *done.notes]
-    return Fit(job.law, done.maps, done.left_out, given, result, reported, done.result, model,
-               known, notes, job.timings, done.predicted, job.history.snapshots)  # fmt: skip
+    return Fit(job.law, done.maps, done.left_out, given, result, reported, model, known, notes,
+               job.timings, done.predicted, job.history.snapshots)  # fmt: skip

@@ -124,6 +124,21 @@ def residuals(pose: RigidTransform, rays: Vectors, seen: Bearings) -> Residuals:
     return Residuals(e / slope, slope, (e_u / slope, e_v / slope), turned)
 
 
+def pose_jacobian(pose: RigidTransform, seen: Bearings, at: Residuals) -> Vectors:
+    """Return dr/dp (6, N) for p = (w, dt) with R' = exp([w]x) R and t' = t + dt.
+
+    With s = r grad(e)/|grad(e)| the derivative of e/|grad e| is that of e with b replaced by
+    b - B s, all over |grad e|.
+    """
+    corrected = seen.b - at.r * (at.unit_slope[0] * seen.b_u + at.unit_slope[1] * seen.b_v)
+    corrected /= at.slope
+    t = pose.t
+    # b . (t x (w x d)) = w . (b (t . d) - t (b . d)) with d the turned ray.
+    of_rotation = corrected * (t @ at.turned) - t[:, None] * dot(corrected, at.turned)
+    # b . (dt x d) = dt . (d x b)
+    return np.concatenate([of_rotation, cross(at.turned, corrected)])
+
+
 def jacobian(
     pose: RigidTransform,
     projector: ProjectorModel,
@@ -135,19 +150,12 @@ def jacobian(
 ) -> Vectors:
     """Return dr/dp (P, N) for p = (w, t's two tangent directions[, log focal]).
 
-    The chart is R' = exp([w]x) R and t' = t + T p with T = ``tangent_basis(t)``, |t| = 1. With
-    s = r grad(e)/|grad(e)| the derivative of e/|grad e| is that of e with b replaced by b - B s,
-    all over |grad e|. The focal column is a forward difference: it needs second derivatives of
-    the law.
+    The chart is R' = exp([w]x) R and t' = t + T p with T = ``tangent_basis(t)``, |t| = 1. The focal
+    column is a forward difference: it needs second derivatives of the law.
     """
-    corrected = seen.b - at.r * (at.unit_slope[0] * seen.b_u + at.unit_slope[1] * seen.b_v)
-    corrected /= at.slope
     rows = np.empty((5 + refine_focal, at.r.size))
-    t = pose.t
-    # b . (t x (w x d)) = w . (b (t . d) - t (b . d)) with d the turned ray.
-    rows[:3] = corrected * (t @ at.turned) - t[:, None] * dot(corrected, at.turned)
-    # b . (dt x d) = dt . (d x b)
-    rows[3:5] = tangent_basis(t).T @ cross(at.turned, corrected)
+    of_pose = pose_jacobian(pose, seen, at)
+    rows[:3], rows[3:5] = of_pose[:3], tangent_basis(pose.t).T @ of_pose[3:]
     if refine_focal:
         nudged = projector.with_(focal=projector.focal * np.exp(_LOG_FOCAL_STEP))
         rows[5] = (residuals(pose, rays, bearings(nudged, q, seen)).r - at.r) / _LOG_FOCAL_STEP

@@ -1,186 +1,212 @@
 """Wrong models: whether a calibration notices, names the cause and widens its intervals.
 
-Small NumPy scenes, each draw with its own rig, surface, noise and outliers. Seeds from 5000 on
-judge; others were used while thresholds were chosen.
+Small scenes, each draw with its own rig, surfaces, noise and outliers. Seeds from 5000 on judge;
+others were used while thresholds were chosen. ``python -m scripts.model_error_study`` runs more
+draws, in pieces.
 """
 
-import sys
-from collections.abc import Callable
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Rig
-from mitsuba_endo.records.solution import INTERVAL, Solution
+from mitsuba_endo.records.solution import INTERVAL, PoseEstimate, Solution
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 
+from .model_error_scenes import KINDS, draw, given, right_setting, rigs
 from .report import Figure
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests import rigs
-
 NAME = "model_error"
+RIGHT = "right"
+SEED = 5000
 _figure = partial(Figure, NAME)
-_SEED, _NOISE, _OUTLIERS, _SIZE = 5000, 0.2, 0.1, (512, 400)
 _RIGHT, _WRONG = 40, 5
 """Draws of the right model, and of each wrong one."""
-
-Given = dict[str, Any]
-
-
-def _matrix(given: Given, change: Callable[[np.ndarray], np.ndarray]) -> None:
-    given["camera"]["K"] = change(np.array(given["camera"]["K"])).tolist()
-
-
-def _scaled(fx: float, fy: float) -> Callable[[Given], None]:
-    return lambda g: _matrix(g, lambda K: K * [[fx, 1, 1], [1, fy, 1], [1, 1, 1]])
+_FIRST = 2
+"""The right candidate, or one of its group, must be among so many."""
+_LARGE = 5
+"""A group of more than this names nothing."""
+_UNWARNED = 3.0
 
 
-def _moved(x: float, y: float) -> Callable[[Given], None]:
-    return lambda g: _matrix(g, lambda K: K + np.array([[0, 0, x], [0, 0, y], [0, 0, 0]]))
+@dataclass(frozen=True)
+class Drawn:
+    """What one draw led to."""
 
+    kind: str
+    seed: int
+    refused: bool = False
+    """Whether the input was refused, with the reason."""
+    warned_before: bool = False
+    """Whether a warning about the camera matrix came before solving."""
+    suspected: bool = False
+    named: bool = False
+    first: str = ""
+    """Key of the first candidate."""
+    group: int = 0
+    """Members of its group beside it."""
+    deviations: list[float] = field(default_factory=list)
+    """Errors of focal length and pose, in stated standard deviations."""
+    wider: float = 1.0
+    """Stated deviation of the focal length over that without the check."""
+    slower: float = 1.0
+    """CPU time over that without the check."""
 
-def _resized(factor: float) -> Callable[[Given], None]:
-    return lambda g: _matrix(g, lambda K: K * [[factor], [factor], [1]])
+    @property
+    def noticed(self) -> bool:
+        return self.refused or self.warned_before or self.suspected
 
-
-def _camera_term(index: int, change: float) -> Callable[[Given], None]:
-    def apply(given: Given) -> None:
-        given["camera"]["distortion"][index] += change
-
-    return apply
-
-
-def _projector(**fields: Any) -> Callable[[Given], None]:
-    return lambda g: g["projector"].update(fields)
-
-
-def _centre(given: Given) -> None:
-    x, y = given["projector"]["centre"]
-    given["projector"]["centre"] = [x + 20, y - 10]
-
-
-KINDS: dict[str, tuple[Callable[[Given], None], tuple[str, ...]]] = {
-    "no distortion": (lambda g: g["camera"].update(distortion=[]), ("camera_distortion",)),
-    "camera k1": (_camera_term(0, 0.01), ("camera_distortion.k1",)),
-    "camera k2": (_camera_term(1, 0.05), ("camera_distortion.k2",)),
-    "camera focal 3 %": (_scaled(1.03, 1.03), ("camera_focal.focal",)),
-    "camera focal 20 %": (_scaled(1.2, 1.2), ("camera_focal.focal",)),
-    "camera aspect 2 %": (_scaled(1, 1.02), ("camera_focal.aspect",)),
-    "camera cx": (_moved(4, 0), ("camera_centre.x",)),
-    "camera cy": (_moved(0, 4), ("camera_centre.y",)),
-    "double resolution": (_resized(2), ("camera_focal", "camera_centre")),
-    "half resolution": (_resized(0.5), ("camera_focal", "camera_centre")),
-    "crop": (_moved(-20, -12), ("camera_centre",)),
-    "other law": (_projector(law="pinhole"), ("law",)),
-    "projector centre": (_centre, ("centre",)),
-    "projector k1": (_projector(distortion=[0.03]), ("distortion.k1",)),
-    "projector aspect": (_projector(aspect=1.02), ("aspect",)),
-}
-"""What is changed, and the keys of the candidates that it is rightly called."""
+    @property
+    def record(self) -> dict[str, object]:
+        return asdict(self)
 
 
 def run(quick: bool) -> list[Figure]:
     """Calibrate right and wrong models."""
-    right = [_solve(_SEED + k, None) for k in range(2 if quick else _RIGHT)]
-    out = _right_figures([r for r in right if r[0] is not None])
+    drawn = [one(RIGHT, SEED + k) for k in range(2 if quick else _RIGHT)]
     for kind in list(KINDS)[:2] if quick else KINDS:
-        solved = [_solve(_SEED + 100 + k, kind) for k in range(1 if quick else _WRONG)]
-        out += _wrong_figures(kind, solved)
-    return out
+        drawn += [one(kind, SEED + 100 + k) for k in range(1 if quick else _WRONG)]
+    return figures(drawn)
 
 
-def _solve(seed: int, kind: str | None) -> tuple[Solution | None, rigs.Rig]:
-    """Return the solution, None where the input was refused, and the truth."""
-    rig = _scene(seed)
-    given = _given(rig)
-    if kind is not None:
-        KINDS[kind][0](given)
+def one(kind: str, seed: int) -> Drawn:
+    """Draw a rig, say something wrong of it or nothing, and calibrate with the check and without.
+
+    Two runs, so that widths and times are compared on the same draw.
+    """
+    frames, rig = _said(kind, seed)
     try:
-        map_ = CorrespondenceMap(q=rig.q.astype(np.float32), name="a")
-        return calibrate([map_], Rig.model_validate(given), Options(check_model=True)).solution, rig
+        checked, seconds = _calibrated(frames, rig, check=True)
+        plain, without = _calibrated(frames, rig, check=False)
     except InputError:
-        return None, rig
+        return Drawn(kind, seed, refused=True)
+    candidates = checked.model["candidates"]
+    return Drawn(
+        kind, seed,
+        warned_before=any(w.startswith("camera.K") for w in checked.warnings),
+        suspected=checked.model["suspected"],
+        named=kind != RIGHT and _named(checked, KINDS[kind].names),
+        first=candidates[0]["key"] if candidates else "",
+        group=len(candidates[0]["group"]) if candidates else 0,
+        deviations=_deviations(checked, frames[0]),
+        wider=_std(checked) / _std(plain), slower=seconds / without,
+    )  # fmt: skip
 
 
-def _scene(seed: int) -> rigs.Rig:
-    rng = np.random.default_rng(seed)
-    while True:
-        focal = _SIZE[0] * rng.uniform(0.6, 1.4)
-        x, y = (np.array(_SIZE) - 1) * rng.uniform(0.45, 0.55, 2)
-        angle, out = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(-25, 25))
-        t = [np.cos(out) * np.cos(angle), np.cos(out) * np.sin(angle), np.sin(out)]
-        axis = rng.normal(size=3)
-        turn = axis / np.linalg.norm(axis) * np.radians(rng.uniform(0, 20))
-        pose = rigs.RigidTransform.of(turn, rng.uniform(5, 10) * np.array(t))
-        tilt = rng.uniform(-0.4, 0.4, 2)
-        sheet = rigs.bumpy_sheet(70, (tilt[0], tilt[1]), 6, int(rng.integers(1 << 30)))
-        model = projector_model("direction_cosine", focal, (x, y))
-        rig = rigs.cast(rigs.lopsided_camera(128, 96), model, _SIZE, pose, sheet)
-        if np.isfinite(rig.q[..., 0]).mean() > 0.4:
-            return rigs.with_outliers(rigs.with_noise(rig, _NOISE, seed), _OUTLIERS, seed)
+def solution_of(kind: str, seed: int) -> tuple[Solution, float]:
+    """Return what a draw's calibration says, and the true focal length, pattern pixels."""
+    frames, rig = _said(kind, seed)
+    return _calibrated(frames, rig, check=True)[0], float(frames[0].projector.focal)
 
 
-def _given(rig: rigs.Rig) -> Given:
-    camera = rig.camera
-    return {
-        "camera": {
-            "model": "opencv", "width": camera.width, "height": camera.height,
-            "K": np.array(camera.K).tolist(), "distortion": list(camera.distortion),
-        },
-        "projector": {
-            "law": rig.projector.law, "width": _SIZE[0], "height": _SIZE[1],
-            "centre": [float(x) for x in rig.projector.centre],
-        },
-        "scale": {"baseline": rig.baseline},
-    }  # fmt: skip
+def _said(kind: str, seed: int) -> tuple[list[rigs.Rig], dict[str, object]]:
+    """Return a draw, and the rig file in which something of it is wrong."""
+    setting = right_setting(seed) if kind == RIGHT else KINDS[kind].setting
+    frames = draw(seed, setting)
+    rig = given(frames, setting.law)
+    if kind != RIGHT:
+        KINDS[kind].change(rig)
+    return frames, rig
 
 
-def _deviations(solution: Solution, rig: rigs.Rig) -> float:
-    """Return the focal length's error over its stated deviation."""
-    focal = solution.projector.focal
-    if not isinstance(focal.value, float) or not isinstance(focal.std, float):
-        return 0.0
-    return abs(focal.value - float(rig.projector.focal)) / focal.std
+def _calibrated(
+    frames: Sequence[rigs.Rig], rig: dict[str, object], *, check: bool
+) -> tuple[Solution, float]:
+    """Return the solution and the CPU seconds that it took."""
+    maps = [CorrespondenceMap(f.q.astype(np.float32), f"{k}") for k, f in enumerate(frames)]
+    began = time.process_time()
+    found = calibrate(maps, Rig.model_validate(rig), Options(check_model=check)).solution
+    return found, time.process_time() - began
 
 
-def _right_figures(solved: list[tuple[Solution | None, rigs.Rig]]) -> list[Figure]:
-    known = [(s, r) for s, r in solved if s is not None]
-    alarms = np.mean([s.model["suspected"] for s, _ in known])
-    inside = np.mean([_deviations(s, r) < INTERVAL for s, r in known])
-    wider = np.mean([s.model["intervals_by"] for s, _ in known])
+def _std(solution: Solution) -> float:
+    std = solution.projector.focal.std
+    return std if isinstance(std, float) else 1.0
+
+
+def _deviations(solution: Solution, truth: rigs.Rig) -> list[float]:
+    """Return absolute errors over stated deviations, of what has a value."""
+    out, focal = [], solution.projector.focal
+    if isinstance(focal.value, float) and isinstance(focal.std, float):
+        out.append(abs(focal.value - float(truth.projector.focal)) / focal.std)
+    return [*out, *_of_pose(solution.frames[0].projector_from_camera, truth)]
+
+
+def _of_pose(estimate: PoseEstimate, truth: rigs.Rig) -> list[float]:
+    pose, true = estimate.to_transform(), truth.projector_from_camera
+    if pose is None or estimate.std is None:
+        return []
+    turned = Rotation.from_matrix(pose.R @ true.R.T).as_rotvec()
+    error, std = np.concatenate([turned, pose.t - true.t]), np.array(estimate.std)
+    return [float(x) for x in np.abs(error[std > 0]) / std[std > 0]]
+
+
+def _named(solution: Solution, names: tuple[str, ...]) -> bool:
+    """Tell whether the right candidate, or one of whose group it is, is among the first two."""
+    model = solution.model
+    plan = [f"plan.{p['block']}" for p in model["plan"] if p["refuted"]]
+    keys = plan + [c["key"] for c in model["candidates"][:_FIRST]]
+    keys += [key for c in model["candidates"][:_FIRST] if len(c["group"]) <= _LARGE
+             for key in c["group_keys"]]  # fmt: skip
+    return any(key.startswith(names) for key in keys)
+
+
+def figures(drawn: Sequence[Drawn]) -> list[Figure]:
+    """Return the figures of every kind that was drawn."""
+    out = []
+    for kind in (RIGHT, *KINDS):
+        of_kind = [d for d in drawn if d.kind == kind]
+        if of_kind:
+            out += _right(of_kind) if kind == RIGHT else _wrong(kind, of_kind)
+    return [*out, *_times(drawn)]
+
+
+def _right(drawn: Sequence[Drawn]) -> list[Figure]:
+    inside = [x < INTERVAL for d in drawn for x in d.deviations]
+    focal = [d.deviations[0] < INTERVAL for d in drawn if d.deviations]
+    wider = [d.wider for d in drawn]
     return [
-        _figure("right: draws", len(known), "", ""),
-        _figure("right: false alarms", 100 * float(alarms), "%", "lower", 2),
-        _figure("right: truth inside 95 %", 100 * float(inside), "%", "higher", 93),
-        _figure("right: width of intervals over noise alone", float(wider), "", "lower", 1.15),
-    ]
-
-
-def _wrong_figures(kind: str, solved: list[tuple[Solution | None, rigs.Rig]]) -> list[Figure]:
-    """Return shares of detected and named; a refusal of the input is both."""
-    seen = [s is None or s.model["suspected"] for s, _ in solved]
-    named = [s is None or _named(s, KINDS[kind][1]) for s, _ in solved]
-    unwarned = [
-        not is_seen and s is not None and _deviations(s, r) > 3
-        for is_seen, (s, r) in zip(seen, solved, strict=True)
-    ]
-    return [
-        _figure(f"{kind}: detected, {len(solved)} draws", 100 * float(np.mean(seen)), "%",
-                "higher", 99),
-        _figure(f"{kind}: first or second named", 100 * float(np.mean(named)), "%", "higher", 90),
-        _figure(f"{kind}: unwarned beyond 3 deviations", float(np.sum(unwarned)), "", "lower", 0),
+        _figure("right: draws", len(drawn), "", ""),
+        _figure("right: false alarms", _percent([d.suspected for d in drawn]), "%", "lower", 2),
+        _figure("right: focal length inside 95 %", _percent(focal), "%", "higher", 93),
+        _figure("right: focal length and pose inside 95 %", _percent(inside), "%", "higher", 93),
+        _figure("right: width of intervals over that without the check, mean",
+                float(np.mean(wider)), "", "lower", 1.15),
+        _figure("right: the same, worst", max(wider), "", "lower"),
     ]  # fmt: skip
 
 
-def _named(solution: Solution, keys: tuple[str, ...]) -> bool:
-    """Tell whether the right candidate, or one of whose group it is, is among the first two."""
-    candidates = solution.model["candidates"]
-    words = {c["words"] for c in candidates if c["key"].startswith(keys)}
-    return any(c["key"].startswith(keys) or words & set(c["group"]) for c in candidates[:2])
+def _wrong(kind: str, drawn: Sequence[Drawn]) -> list[Figure]:
+    """Return shares of detected and named; a refusal or warning of the input is both."""
+    noticed = [d.noticed for d in drawn]
+    named = [d.named or d.refused or d.warned_before for d in drawn]
+    beyond = [max(d.deviations, default=0.0) > _UNWARNED for d in drawn]
+    unwarned = [b and not n for b, n in zip(beyond, noticed, strict=True)]
+    return [
+        _figure(f"{kind}: detected, {len(drawn)} draws", _percent(noticed), "%", "higher", 99),
+        _figure(f"{kind}: first or second named", _percent(named), "%", "higher", 90),
+        _figure(f"{kind}: unwarned beyond 3 deviations", sum(unwarned), "", "lower", 0),
+        _figure(f"{kind}: beyond 3 deviations at all", _percent(beyond), "%", "lower"),
+    ]
+
+
+def _times(drawn: Sequence[Drawn]) -> list[Figure]:
+    right = [d.slower for d in drawn if d.kind == RIGHT]
+    wrong = [d.slower for d in drawn if d.kind != RIGHT and not d.refused]
+    title = "CPU time over that without the check, median"
+    return [
+        _figure(f"{title}, {name}", float(np.median(of)), "", "lower", 1.3)
+        for name, of in (("right", right), ("wrong", wrong))
+        if of
+    ]
+
+
+def _percent(held: Sequence[bool]) -> float:
+    return 100 * float(np.mean(held))

@@ -26,6 +26,7 @@ from mitsuba_endo.records.solution import Estimate, LeftOut, Outcome, PoseEstima
 from mitsuba_endo.records.surface import save_surface
 from mitsuba_endo.show.read_folder import read_solution_folder
 from mitsuba_endo.show.report import save_report
+from mitsuba_endo.show.report_sections import model
 from mitsuba_endo.show.result_scene import ResultScene
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.truth import load_truth
@@ -415,3 +416,18 @@ def test_works_in_a_browser(report: Path, tmp_path: Path):
     assert found is not None
     assert found[1] == "true|2y|0.6|run/frame_2.exr|0|none|true"
     assert "CONSOLE" not in done.stderr
+
+
+def test_the_model_s_candidates_are_listed_with_what_is_known_of_them(
+    make_calibration: Maker,
+) -> None:
+    """A candidate of several values has no number."""
+    one = {"words": "camera distortion (k1)", "value": -0.01, "std": 0.001, "unit": "",
+           "share": 0.9, "group": ["camera distortion"]}  # fmt: skip
+    whole = {**one, "words": "projector centre", "value": None, "std": None, "group": []}
+    found = {"suspected": True, "structure": 0.3, "expected": 0.06, "intervals_by": 2.0,
+             "candidates": [one, whole]}  # fmt: skip
+    text = model(make_calibration().solution.model_copy(update={"model": found}))
+    assert "-0.01 ± 0.001" in text
+    assert "<tr><th>projector centre</th><td></td><td>90 %</td><td></td></tr>" in text
+    assert "inf" not in text.replace("information", "")

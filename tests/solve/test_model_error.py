@@ -10,7 +10,7 @@ import pytest
 
 from mitsuba_endo.geometry.laws import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.records.rig import Camera, Projector, Rig, Scale
+from mitsuba_endo.records.rig import Camera, Projector, Rig, Scale, Share
 from mitsuba_endo.records.solution import Solution
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
@@ -21,37 +21,92 @@ from .problems import POSE
 pytestmark = pytest.mark.usefixtures("llvm")
 
 FOCAL = 410.0
+LAW = "direction_cosine"
 
 
 @cache
-def solved(k1: float = 0.0, centre: float = 0.0) -> Solution:
-    """Calibrate with the camera's k1 and the projector's centre off by so much."""
+def solved(
+    k1: float = 0.0, centre: float = 0.0, law: str = LAW, camera_focal: float = 1.0,
+    lens: bool = True, K_std: bool = False, check: bool = True,
+) -> Solution:  # fmt: skip
+    """Calibrate with the camera's k1 and the projector's centre off by so much, and so on."""
     camera, size = lopsided_camera(128, 96), (512, 400)
-    projector = projector_model("direction_cosine", FOCAL, (250.0, 205.0))
+    projector = projector_model(LAW, FOCAL, (250.0, 205.0))
     rig = cast(camera, projector, size, POSE, bumpy_sheet(70.0, (0.2, -0.1), 6.0, 4))
     rig = with_outliers(with_noise(rig, 0.2, 1), 0.1, 2)
+    K = np.array(camera.K) * [[camera_focal, 1, 1], [1, camera_focal, 1], [1, 1, 1]]
     given = Rig(
         camera=Camera(
-            width=128, height=96, K=np.array(camera.K).tolist(),
-            distortion=[camera.distortion[0] + k1, *camera.distortion[1:]],
+            width=128, height=96, K=K.tolist(),
+            distortion=[camera.distortion[0] + k1, *camera.distortion[1:]] if lens else [],
+            K_std=[0.4, 0.4, 1.0, 1.0] if K_std else None,
         ),
-        projector=Projector(
-            law="direction_cosine", width=512, height=400, centre=[250.0 + centre, 205.0]
-        ),
+        projector=Projector(law=law, width=512, height=400, centre=[250.0 + centre, 205.0]),
         scale=Scale(baseline=rig.baseline),
     )  # fmt: skip
     map_ = CorrespondenceMap(q=rig.q.astype(np.float32), name="a")
-    return calibrate([map_], given, Options(check_model=True)).solution
+    return calibrate([map_], given, Options(check_model=check)).solution
+
+
+@cache
+def clamped(moves: float) -> Solution:
+    """Calibrate four frames of own surfaces whose projector is said to be clamped."""
+    rng = np.random.default_rng(3)
+    camera, size = lopsided_camera(128, 96), (512, 400)
+    projector = projector_model(LAW, FOCAL, (250.0, 205.0))
+    maps = []
+    for k in range(4):
+        own = type(POSE).of(rng.normal(0, np.radians(moves), 3), np.zeros(3))
+        pose = type(POSE)(own.R @ POSE.R, POSE.t)
+        rig = cast(camera, projector, size, pose, bumpy_sheet(70.0, (0.2, -0.1), 6.0, 4 + k))
+        q = with_outliers(with_noise(rig, 0.2, k), 0.1, k).q.astype(np.float32)
+        maps.append(CorrespondenceMap(q=q, name=f"frame {k}"))
+    given = Rig(
+        camera=Camera.from_model(camera),
+        projector=Projector(law=LAW, width=512, height=400, centre=[250.0, 205.0]),
+        scale=Scale(baseline=float(np.linalg.norm(POSE.t))),
+        share=Share(surface="per_frame", projector_pose="shared"),
+    )
+    return calibrate(maps, given).solution
+
+
+def focal_error(solution: Solution) -> float:
+    """Return the focal length's error in stated deviations."""
+    focal = solution.projector.focal
+    assert isinstance(focal.value, float)
+    assert isinstance(focal.std, float)
+    return abs(focal.value - FOCAL) / focal.std
+
+
+def test_the_model_is_tested_by_default() -> None:
+    assert Options().check_model
 
 
 def test_a_right_model_is_not_suspected() -> None:
     solution = solved()
     assert not solution.model["suspected"]
     assert solution.model["design_effect"] < 2
-    assert solution.model["carried"] == []
+    assert solution.model["doubted"] == []
     assert solution.verdict[-1] == "Model: the residuals look like noise."
     assert not any("residuals" in w for w in solution.warnings)
-    assert solution.projector.centre.status == "fixed"
+
+
+def test_a_right_model_has_the_intervals_of_its_noise() -> None:
+    """Oracle: the same calibration without the check."""
+    checked, plain = solved().projector.focal, solved(check=False).projector.focal
+    assert checked == plain
+    assert solved(check=False).model == {}
+
+
+@pytest.mark.parametrize("error", [{"k1": 0.01}, {"centre": 12.0}, {"camera_focal": 1.2}])
+def test_what_was_given_stays_and_moves_no_estimate(error: dict[str, float]) -> None:
+    """Fixed means fixed. Oracle: the same calibration without the check."""
+    checked, plain = solved(**error), solved(**error, check=False)
+    value, plainly = checked.projector.focal.value, plain.projector.focal.value
+    assert value is None or value == plainly
+    assert checked.camera == plain.camera
+    assert checked.projector.centre == plain.projector.centre
+    assert checked.projector.centre.status == "fixed"
 
 
 def test_a_wrong_distortion_is_named_with_its_value() -> None:
@@ -64,14 +119,43 @@ def test_a_wrong_distortion_is_named_with_its_value() -> None:
     assert "--share camera_distortion=shared" in warning
 
 
-@pytest.mark.parametrize("error", [{"k1": 0.01}, {"centre": 12.0}])
+@pytest.mark.parametrize(
+    ("error", "key"),
+    [
+        ({"camera_focal": 1.2}, "camera_focal.focal"),
+        ({"law": "pinhole"}, f"law.{LAW}"),
+        ({"centre": 25.0}, "centre.x"),
+        ({"lens": False}, "camera_distortion"),
+    ],
+)
+def test_a_gross_error_is_named_by_refits(error: dict, key: str) -> None:
+    """The prediction to first order puts others first for the first two."""
+    model = solved(**error).model
+    first = model["candidates"][0]
+    assert any(k.startswith(key) for k in [first["key"], *first["group_keys"]])
+
+
+@pytest.mark.parametrize("error", [{"k1": 0.01}, {"centre": 12.0}, {"camera_focal": 1.03}])
 def test_the_interval_holds_the_truth_though_the_model_is_wrong(error: dict[str, float]) -> None:
-    """Oracle: the focal length, to 1 %; the formal deviation alone is far too small."""
+    """Oracle: the focal length, to 2 %; the deviation that trusts the model is far too small."""
     focal = solved(**error).projector.focal
     assert isinstance(focal.value, float)
     assert isinstance(focal.std, float)
-    assert abs(focal.value - FOCAL) < min(3 * focal.std, 0.01 * FOCAL)
     assert focal.std < 0.02 * FOCAL, "an interval that holds everything tells nothing"
+    assert isinstance(focal.std_formal, float)
+    assert focal_error(solved(**error)) < 2
+    assert abs(focal.value - FOCAL) > 4 * focal.std_formal
+
+
+def test_a_stated_uncertainty_is_in_the_interval_of_a_right_model_too() -> None:
+    """Without a warning: nothing is wrong."""
+    solution, exact = solved(K_std=True), solved()
+    assert not solution.model["suspected"]
+    assert solution.model["doubted"] == ["camera_focal", "camera_centre"]
+    assert isinstance(solution.projector.focal.std, float)
+    assert isinstance(exact.projector.focal.std, float)
+    assert solution.projector.focal.std > 1.2 * exact.projector.focal.std
+    assert solution.projector.focal.value == exact.projector.focal.value
 
 
 def test_relief_is_not_blamed_for_an_error_of_the_model() -> None:
@@ -79,3 +163,17 @@ def test_relief_is_not_blamed_for_an_error_of_the_model() -> None:
     text = " ".join([*solution.verdict, *solution.warnings])
     assert solution.model["suspected"]
     assert "relief is too small" not in text
+
+
+def test_a_projector_that_moves_though_said_to_be_clamped_is_named() -> None:
+    solution = clamped(moves=1.0)
+    assert [p["block"] for p in solution.model["plan"] if p["refuted"]] == ["projector_pose"]
+    (warning,) = [w for w in solution.warnings if "does not explain" in w]
+    assert "each frame wants its own projector pose" in warning
+    assert "use per_frame for it" in warning
+
+
+def test_a_clamped_projector_is_not_said_to_move() -> None:
+    model = clamped(moves=0.0).model
+    assert not model["suspected"]
+    assert not any(p["refuted"] for p in model["plan"])

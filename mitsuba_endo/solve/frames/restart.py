@@ -77,12 +77,14 @@ def _restarted(
     if not best:
         return None
     try:
-        return [
+        again = [
             _at(maps[k], start, camera, best[k]) if k in best else start
             for k, start in enumerate(starts)
         ]
     except InputError:  # too few correspondences remain before both devices
         return None
+    # A pose that frames share may suit some of them so badly that nothing of them is left.
+    return again if all(start.used.any() for start in again) else None
 
 
 def _at(map_: CorrespondenceMap, start: Start, camera: CameraModel, rival: Rival) -> Start:

@@ -58,8 +58,6 @@ class Fit:
     """The calibration."""
     reported: OptimisationResult
     """The same with the surface smoothed as it is reported."""
-    plain: OptimisationResult
-    """The calibration before errors of the model were carried into it; the same where none were."""
     model: ModelCheck | None
     """What the residuals say of the model, None where that was not asked."""
     uncertainty: Uncertainty

@@ -27,10 +27,10 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     """
     if len(fits) == 1:
         return fits[0], {}, []
-    sigma = min(f.plain.noise.sigma for f in fits)
-    costs = [_block_costs(f.plain, sigma) for f in fits]
+    sigma = min(f.result.noise.sigma for f in fits)
+    costs = [_block_costs(f.result, sigma) for f in fits]
     common = sorted(set.intersection(*(set(c) for c in costs)))
-    totals = [sum(c[key] for key in common) + _prior(f.plain, sigma)
+    totals = [sum(c[key] for key in common) + _prior(f.result, sigma)
               for c, f in zip(costs, fits, strict=True)]  # fmt: skip
     order = sorted(range(len(fits)), key=lambda i: totals[i])
     best, other = order[0], order[1]
@@ -58,7 +58,7 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
         "log_likelihood_difference": total,
         "standard_errors": significance,
         "noise_px": {f.law: f.uncertainty.sigma for f in fits},
-        "focal": {f.law: f.plain.state.focals[0] for f in fits},
+        "focal": {f.law: f.result.state.focals[0] for f in fits},
     }
     warning = [] if decided else [f"{text}; give projector.law if it is known"]
     return fits[best], evidence, warning

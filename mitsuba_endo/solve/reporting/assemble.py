@@ -86,7 +86,7 @@ def assemble(
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(
         solution, refined, surfaces[0], frame_maps(fit, renderings), fit.result.trace,
-        checkpoint_of(fit.plain), dict(enumerate(surfaces[1:], 1)),
+        checkpoint_of(fit.result), dict(enumerate(surfaces[1:], 1)),
         scaled(fit.history, unit.factor),
     )  # fmt: skip
 

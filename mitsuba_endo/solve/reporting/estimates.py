@@ -52,12 +52,13 @@ class Estimates:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(G, G) formal one, times the design effect of the residuals, and scaled so that no
-        variance is below the jackknife's.
+        """(G, G) formal one, times the design effect of the residuals, with what errors of the
+        given values add, and scaled so that no variance is below the jackknife's.
         """
         formal, model = self.fit.uncertainty.formal, self.fit.model
         if model is not None:
             formal = with_effect(self.fit.reported, formal, model.effect)
+            formal = formal if model.added is None else formal + model.added
         variance = np.diag(formal)
         largest = np.max([variance, *jackknife_variances(self.fit)], axis=0)
         root = np.sqrt(largest / np.maximum(variance, 1e-300))

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from ...records.solution import Outcome
 from ..inference.fit import Fit
 from ..inference.model_error.analysis import ModelCheck
+from ..inference.model_error.refits import MATRIX
 from ..inference.model_error.score_tests import ModelCandidate
 from ..unknowns.block import BLOCKS
 
 _LISTED = 6
 """Candidates that are recorded."""
-_NAMED = 3
-"""Members of a group that are named in a sentence."""
+_NAMED = 4
+"""Members of a group that are named in a sentence; of a larger one it is said that it is large."""
 
 
 def model_section(fit: Fit) -> dict[str, Any]:
@@ -19,18 +19,22 @@ def model_section(fit: Fit) -> dict[str, Any]:
     check = fit.model
     if check is None:
         return {}
-    structure = check.tests.before.structure
+    structure, refuted = check.tests.before.structure, check.refuted_plan
     return {
         "structure": structure.ratio,
         "expected": structure.white,
         "deviations": structure.deviations,
-        "remaining_structure": check.final.structure.ratio,
+        "remaining_structure": check.tests.after.structure.ratio,
         "design_effect": check.tests.before.effect.largest,
         "intervals_by": check.effect**0.5,
         "suspected": check.wrong,
-        "candidates": [_candidate(check, c) for c in check.tests.candidates[:_LISTED]],
-        "plan": [{"block": p.block, "mode": p.mode, "chance": p.chance} for p in check.plan],
-        "carried": list(check.carried),
+        "unexplained": check.unexplained,
+        "candidates": [_candidate(check, c) for c in check.causes.candidates[:_LISTED]],
+        "plan": [
+            {"block": p.block, "mode": p.mode, "chance": p.chance, "refuted": p in refuted}
+            for p in check.plan
+        ],
+        "doubted": [] if check.nuisance is None else list(check.nuisance.blocks),
         "conclusion": conclusion(check),
     }
 
@@ -47,10 +51,10 @@ def conclusion(check: ModelCheck) -> str:
     ]
     out += [plan_advice(p.words) for p in check.refuted_plan[:1]]
     if not check.refuted_plan:
-        accused = [suspicion(check, c) for c in check.accused[:1]]
-        out += accused or ["nothing that was tried explains it"]
-    if check.carried:
-        out.append("what was given counts as known to the precision of careful calibrations only")
+        accused = [suspicion(c) for c in check.accused[:1]]
+        out += accused or ["nothing that was tried explains it: decoder, surface or light may"]
+    if check.nuisance is not None and check.nuisance.blocks:
+        out.append("the intervals allow for errors of what was given")
     return "; ".join(out)
 
 
@@ -59,19 +63,28 @@ def plan_advice(words: str) -> str:
     return f"each frame wants its own {words}: the plan does not fit, use per_frame for it"
 
 
-def suspicion(check: ModelCheck, candidate: ModelCandidate) -> str:
+def suspicion(candidate: ModelCandidate) -> str:
     """Name the candidate that explains most, what mends it, and what cannot be told from it."""
-    share = 100 * check.share(candidate.gain)
-    if candidate.unit or candidate.block:
+    if _is_whole(candidate):
+        text = f"{candidate.words} looks wrong as a whole"
+    elif candidate.unit or candidate.block:
         value = f"{abs(candidate.value):.2g} {candidate.unit}".strip()
         side = "small" if candidate.value > 0 else "large"
         text = f"{candidate.words} looks {value} too {side}"
     else:
         text = f"{candidate.words} would fit better"
-    text += f" (explains {share:.0f} %)"
-    if candidate.group:
-        text += f", or it is {' or '.join(candidate.group[:_NAMED])}, which look alike"
+    text += f" (explains {100 * candidate.share:.0f} %)"
+    others = [words for _, words in candidate.group]
+    if len(others) > _NAMED:
+        text += f", or it is {others[0]} or one of {len(others) - 1} others, which look alike"
+    elif others:
+        text += f", or it is {' or '.join(others)}, which look alike"
     return f"{text}: {_todo(candidate)}"
+
+
+def _is_whole(candidate: ModelCandidate) -> bool:
+    """Tell whether a candidate is several values together, which no number describes."""
+    return candidate.key == MATRIX or (candidate.key in BLOCKS and not candidate.unit)
 
 
 def _todo(candidate: ModelCandidate) -> str:
@@ -84,15 +97,18 @@ def _todo(candidate: ModelCandidate) -> str:
 def model_warnings(fit: Fit) -> list[str]:
     """Return what must be known before trusting the values; nothing where the model holds."""
     check = fit.model
-    if check is None or not check.wrong or fit.result.outcome is Outcome.INTERRUPTED:
+    if check is None or not check.wrong:
         return []
     return [f"the model does not explain the residuals: {conclusion(check)}"]
 
 
 def _candidate(check: ModelCheck, c: ModelCandidate) -> dict[str, Any]:
     names = [] if c.block is None else [BLOCKS[c.block].words]
+    whole = _is_whole(c)
     return {
-        "key": c.key, "words": c.words, "value": c.value, "std": c.std, "unit": c.unit,
-        "share": check.share(c.gain), "significant": c in check.accused,
-        "block": (names or [""])[0], "group": list(c.group),
+        "key": c.key, "words": c.words, "value": None if whole else c.value,
+        "std": None if whole else c.std, "unit": c.unit,
+        "share": c.share, "significant": c in check.accused,
+        "block": (names or [""])[0], "group": [words for _, words in c.group],
+        "group_keys": [key for key, _ in c.group],
     }  # fmt: skip

@@ -1,8 +1,10 @@
 """From a fit to the maps and the surface that are saved."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...records.calibration import FrameMaps, SurfaceEstimate
+from ..inference.covariance import shared_modes
 from ..inference.fit import Fit
 from ..minimisers.rendered import Rendering, seen_faces
 
@@ -19,12 +21,28 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
     shape, values = fit.problem.surfaces[surface], fit.state.surfaces[surface]
     faces = shape.faces[seen_faces(fit.reported, surface)]
     kept, flat = np.unique(faces, return_inverse=True)
-    moved = factor * inflation * shape.slopes(values)[kept]
+    moved = factor * shape.slopes(values)[kept]
+    std, modes = _with_nuisance(fit, surface, inflation)
     return SurfaceEstimate(
         factor * shape.vertices(values)[kept], flat.reshape(-1, 3),
-        moved * fit.uncertainty.surface_std[surface][kept],
-        moved[:, None] * fit.uncertainty.surface_modes[surface][kept],
+        moved * std[kept], moved[:, None] * modes[kept],
     )  # fmt: skip
+
+
+def _with_nuisance(
+    fit: Fit, surface: int, inflation: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return deviations (V,) and modes (V, K) of a surface's values, errors of what was given
+    included.
+    """
+    std = inflation * fit.uncertainty.surface_std[surface]
+    modes = inflation * fit.uncertainty.surface_modes[surface]
+    doubt = None if fit.model is None else fit.model.nuisance
+    if doubt is None:
+        return std, modes
+    further = doubt.surface_roots[surface]
+    total = np.sqrt(std**2 + (further**2).sum(1))
+    return total, shared_modes(np.concatenate([modes, further], 1))
 
 
 def frame_maps(fit: Fit, renderings: list[Rendering]) -> list[FrameMaps]:

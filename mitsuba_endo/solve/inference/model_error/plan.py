@@ -39,14 +39,15 @@ def plan_tests(result: OptimisationResult, rig: Rig, noise: float) -> list[PlanT
         noise: variance of one coordinate times its design effect.
     """
     out = []
-    for name, layout in _alternatives(result.problem.layout, rig):
+    for name, layout in alternatives(result.problem.layout, rig):
         gain, further = _gain(result, layout)
         chance = float(chi2.sf(gain / noise, max(further, 1)))
         out.append(PlanTest(name, BLOCKS[name].words, "per_frame", gain, chance))
     return sorted(out, key=lambda t: -t.gain)
 
 
-def _alternatives(old: Layout, rig: Rig) -> Iterator[tuple[str, Layout]]:
+def alternatives(old: Layout, rig: Rig) -> Iterator[tuple[str, Layout]]:
+    """Yield every block that several frames share, and the layout in which each has its own."""
     for name, block in BLOCKS.items():
         shared = old.frames > 1 and old.sharing(name) == "shared" and old.widths[name] > 0
         if not shared or "per_frame" not in block.modes or name == "camera_pose":

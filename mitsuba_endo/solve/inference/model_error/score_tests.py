@@ -10,19 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
+from ....records.rig import Rig
+from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
-from .extended import Extended, given_blocks
+from .extended import Extended, freed, given_blocks
 from .residual_images import Correlation, residual_correlation
 
 Floats = NDArray[np.float64]
 
-ALIKE = 0.95
-"""Correlation of what two candidates do to the residuals from which on the data cannot tell them
-apart."""
+_SEVERAL = 2
 _RANK = 1e-6
 """Eigenvalue of the candidates' correlation below which a direction repeats others."""
+_USEFUL = 20.0
+"""Deviation from noise alone, in those of careful calibrations, above which a value is not tested:
+the data hardly see it, and noise that passes for relief would decide."""
 _UNSEEN = 1e-8
 """Share of a candidate's own information that must be left beside the unknowns."""
 
@@ -42,8 +45,12 @@ class ModelCandidate:
     """Standard deviation of it, with the residuals' correlation."""
     gain: float
     """Fall of the weighted sum of squared residuals."""
-    group: tuple[str, ...] = ()
-    """Words of others whose effect is nearly the same."""
+    shift: Floats | None = None
+    """(G,) by how much the fit's unknowns would move with it."""
+    share: float = 0.0
+    """Part of the residuals' structure that it explains."""
+    group: tuple[tuple[str, str], ...] = ()
+    """Keys and words of others that explain as much, as far as the data tell."""
 
     @property
     def deviations(self) -> float:
@@ -55,6 +62,8 @@ class Tests:
     """All candidates, the most explaining first."""
 
     candidates: list[ModelCandidate]
+    blocks: list[ModelCandidate]
+    """Blocks with several parts, all of them together."""
     before: Correlation
     """Of the residuals."""
     after: Correlation
@@ -65,50 +74,73 @@ class Tests:
     """Its fall by all candidates together."""
     chance: float
     """Probability that correlated noise without any error of the model lets it fall so far."""
+    noise: float
+    """Variance of one whitened coordinate, times the design effect of what is left."""
 
 
-def score_tests(extended: Extended, variance: float) -> Tests:
-    """Test every candidate.
+def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
+    """Test every candidate that the data can tell something of.
 
     Args:
         extended: the fit with the candidates' columns.
+        rig: of the fit.
         variance: of one whitened coordinate.
     """
-    named = _candidates(extended)
+    named = _candidates(extended, rig)
     columns = np.array([direction for *_, direction in named]).T
     W, information, score = extended.directions(columns)
     own = np.einsum("gk,gh,hk->k", columns, extended.S, columns)
     seen = np.diag(information) > _UNSEEN * own
+    seen &= np.diag(information) > variance / np.array([limit for *_, limit, _ in named]) ** 2
     named = [n for n, is_seen in zip(named, seen, strict=True) if is_seen]
     W, information, score = W[:, seen], information[np.ix_(seen, seen)], score[seen]
     step, rank = _joint(information, score)
     gain = float(-score @ step)
-    left = [
-        at.residual + np.where(at.hits, extended.derivatives(k, (W @ step)[:, None])[:, 0], 0.0)
+    before = residual_correlation(extended.result)
+    after = residual_correlation(extended.result, _after(extended, W @ step))
+    noise = variance * after.effect.largest
+    energy = _energy(extended.result)
+    structured = max(before.structure.excess * energy, 1e-300)
+    found = [
+        ModelCandidate(
+            key, words, unit, block, float(-g / i), float(np.sqrt(noise / i)), float(g * g / i),
+            -g / i * w[extended.solved], min(float(g * g / i / structured), 1.0),
+        )
+        for (key, words, unit, block, _, _), g, i, w in zip(
+            named, score, np.diag(information), W.T, strict=True
+        )
+    ]  # fmt: skip
+    chance = float(chi2.sf(gain / noise, max(rank, 1)))
+    blocks = _blocks(found, information, score, W[extended.solved], structured, noise)
+    found.sort(key=lambda c: -c.gain)
+    return Tests(found, blocks, before, after, energy, gain, chance, noise)
+
+
+def _after(extended: Extended, step: Floats) -> list[Floats]:
+    """Return the residuals (2, N) of every frame after a step (G,), to first order."""
+    return [
+        at.residual + np.where(at.hits, extended.derivatives(k, step[:, None])[:, 0], 0.0)
         for k, at in enumerate(extended.result.evaluation.frames)
     ]
-    before = residual_correlation(extended.result)
-    after = residual_correlation(extended.result, left)
-    noise = variance * after.effect.largest
-    found = [
-        ModelCandidate(key, words, unit, block, -g / i, float(np.sqrt(noise / i)), g * g / i)
-        for (key, words, unit, block, _), g, i in zip(
-            named, score, np.diag(information), strict=True
-        )
-    ]
-    energy = sum(
+
+
+def _energy(result: OptimisationResult) -> float:
+    """Return the weighted sum of squared residuals."""
+    return sum(
         float((w * at.squared)[at.hits].sum())
-        for w, at in zip(extended.result.weights, extended.result.evaluation.frames, strict=True)
+        for w, at in zip(result.weights, result.evaluation.frames, strict=True)
     )
-    chance = float(chi2.sf(gain / noise, max(rank, 1)))
-    return Tests(_grouped(found, information), before, after, energy, gain, chance)
 
 
-def _candidates(extended: Extended) -> list[tuple[str, str, str, str | None, Floats]]:
-    """Return key, words, unit, block and direction (G,) of every candidate."""
+def _candidates(
+    extended: Extended, rig: Rig
+) -> list[tuple[str, str, str, str | None, float, Floats]]:
+    """Return key, words, unit, block, largest deviation and direction (G,) of every candidate."""
     layout, size = extended.layout, len(extended.g)
-    out: list[tuple[str, str, str, str | None, Floats]] = []
+    out: list[tuple[str, str, str, str | None, float, Floats]] = []
+    rig = freed(rig, given_blocks(extended.result.problem.layout))
     for name in given_blocks(extended.result.problem.layout):
+        root = BLOCKS[name].doubt(rig, layout.given[name])
         for owner in sorted(set(layout.owners[name])):
             if (name, owner) not in layout.slots:
                 continue
@@ -117,11 +149,32 @@ def _candidates(extended: Extended) -> list[tuple[str, str, str, str | None, Flo
                 direction = np.zeros(size)
                 direction[layout.slots[name, owner]] = T.T @ suspect.step
                 key = f"{name}.{suspect.part}" if suspect.part else name
-                out.append((key, suspect.words, suspect.unit, name, direction))
+                limit = np.inf if root is None else _USEFUL / np.linalg.norm(root @ suspect.step)
+                out.append((key, suspect.words, suspect.unit, name, float(limit), direction))
     for i, special in enumerate(extended.specials):
         direction = np.zeros(size)
         direction[layout.columns + i] = 1.0
-        out.append((special.key, special.words, special.unit, None, direction))
+        out.append((special.key, special.words, special.unit, None, special.limit, direction))
+    return out
+
+
+def _blocks(
+    found: Sequence[ModelCandidate], information: Floats, score: Floats, W: Floats,
+    structured: float, noise: float,
+) -> list[ModelCandidate]:  # fmt: skip
+    """Return every block of several candidates as one."""
+    out = []
+    for name in dict.fromkeys(c.block for c in found if c.block is not None):
+        at = [i for i, c in enumerate(found) if c.block == name]
+        if len(at) < _SEVERAL:
+            continue
+        step, rank = _joint(information[np.ix_(at, at)], score[at])
+        gain = float(-score[at] @ step)
+        share = min(gain / structured, 1.0)
+        deviations = norm.isf(max(chi2.sf(gain / noise, rank), 1e-300) / 2)
+        out.append(ModelCandidate(
+            name, BLOCKS[name].words, "", name, float(deviations), 1.0, gain, W[:, at] @ step, share
+        ))  # fmt: skip
     return out
 
 
@@ -135,13 +188,3 @@ def _joint(information: Floats, score: Floats) -> tuple[Floats, int]:
     turned = vectors.T @ (scale * score)
     step = scale * (vectors[:, kept] @ (turned[kept] / values[kept]))
     return -step, int(kept.sum())
-
-
-def _grouped(found: Sequence[ModelCandidate], information: Floats) -> list[ModelCandidate]:
-    scale = 1 / np.sqrt(np.diag(information)) if len(found) else np.zeros(0)
-    alike = np.abs(information * np.outer(scale, scale)) > ALIKE
-    out = []
-    for i, candidate in enumerate(found):
-        others = [c.words for k, c in enumerate(found) if k != i and alike[i, k]]
-        out.append(ModelCandidate(**{**candidate.__dict__, "group": tuple(others)}))
-    return sorted(out, key=lambda c: -c.gain)

@@ -28,6 +28,11 @@ class Special(Protocol):
         """Of the value; empty where only its presence means something."""
         ...
 
+    @property
+    def limit(self) -> float:
+        """Largest standard deviation, in its unit, with which it is tested."""
+        ...
+
     def column(self, result: OptimisationResult, frame: int) -> Floats:
         """Return the derivative (2, N) of a frame's coordinates, pattern pixels."""
         ...
@@ -48,6 +53,7 @@ class OtherLaw:
         return f"projection model {self.law}"
 
     unit = ""
+    limit = 0.5
 
     def column(self, result: OptimisationResult, frame: int) -> Floats:
         term = result.problem.frames[frame]
@@ -67,6 +73,7 @@ class RadialGain:
     """
 
     unit = "%"
+    limit = 5.0
     key = "radial"
     words = "scale that changes with the distance from the image's centre"
 
