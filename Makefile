@@ -6,12 +6,14 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/.stamps
 
-.PHONY: help demo test test-slow lint format docs benchmark reproduce clean
+.PHONY: help demo test test-slow test-learn statistics lint format docs benchmark reproduce clean
 
 help:
 	@echo "make demo       install into $(VENV) and calibrate a synthetic endoscope (demo-output/)"
 	@echo "make test       run the tests"
 	@echo "make test-slow  run the experiments of minutes too"
+	@echo "make test-learn run the tests of the decoder's training (PyTorch goes into $(VENV))"
+	@echo "make statistics compare stated standard deviations with simulated noise (SEEDS=100)"
 	@echo "make lint       ruff and pyright"
 	@echo "make format     let ruff mend the layout"
 	@echo "make docs       build the documentation (site/)"
@@ -26,6 +28,16 @@ test: $(STAMPS)/test
 
 test-slow: $(STAMPS)/test
 	$(BIN)/python -m pytest -m "slow or not slow"
+
+# Imported first, because without them the tests would be skipped.
+test-learn: $(STAMPS)/test $(STAMPS)/learn
+	$(BIN)/python -c "import torch, onnx, onnxscript, onnxruntime, h5py"
+	$(BIN)/python -m pytest -m "slow or not slow" tests/learn tests/dataset/test_reader.py
+
+SEEDS ?= 100
+
+statistics: $(STAMPS)/test
+	$(BIN)/python -m scripts.statistics_study --seeds $(SEEDS)
 
 lint: $(STAMPS)/lint
 	$(BIN)/ruff check .
@@ -57,6 +69,6 @@ $(STAMPS)/core: $(STAMPS)/venv pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable .
 	touch $@
 
-$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/docs $(STAMPS)/benchmark $(STAMPS)/reproduce: $(STAMPS)/%: $(STAMPS)/core
+$(STAMPS)/test $(STAMPS)/lint $(STAMPS)/docs $(STAMPS)/learn $(STAMPS)/benchmark $(STAMPS)/reproduce: $(STAMPS)/%: $(STAMPS)/core
 	$(BIN)/python -m pip install --quiet --editable ".[$*]"
 	touch $@

@@ -52,6 +52,7 @@ class Sample:
             "jackknife over formal std, RMS": _rms(self.jackknife / self.formal),
             "noise estimate over truth": float(np.mean(self.sigma)),
             "depth error over its std, RMS": _rms(self.depth_error / self.depth_std),
+            "depth error, RMS, %": 100 * _rms(self.depth_error),
         }
 
 

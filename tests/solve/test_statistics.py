@@ -10,7 +10,8 @@ SEEDS = 40
 
 def check(sample: Sample) -> None:
     """Oracles: errors against the truth over the stated standard deviation, which pooled have RMS
-    one and lie within 1.96 in 95 % of the cases; the Cramer-Rao bound; the noise put in.
+    one and lie within 1.96 in 95 % of the cases; the Cramer-Rao bound; the noise put in. The depth
+    has no such bound: 1 % of it caps its error.
 
     With 40 seeds and six correlated unknowns the RMS scatters by about 6 %.
     """
@@ -21,6 +22,7 @@ def check(sample: Sample) -> None:
     assert 0.9 < found["jackknife over formal std, RMS"] < 1.35
     assert found["noise estimate over truth"] == pytest.approx(1, abs=0.03)
     assert 0.8 < found["depth error over its std, RMS"] < 1.25
+    assert found["depth error, RMS, %"] < 1
 
 
 @pytest.mark.slow
