@@ -61,6 +61,7 @@ def _execute(program: str, folder: Path) -> str:
     [
         "start.md",
         "refinement.md",
+        "video.md",
         "tutorials/scene.md",
         "tutorials/projector_law.md",
         "tutorials/dataset.md",
