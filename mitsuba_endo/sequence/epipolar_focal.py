@@ -125,6 +125,14 @@ class _Equations:
         return RigidTransform(near.R, near.t * length / np.linalg.norm(near.t))
 
 
+def pose_directions(pose: RigidTransform) -> Floats:
+    """Return (6, 5) the steps of a pose that lines tell: all but the translation's length."""
+    basis = np.zeros((6, 5))
+    basis[:3, :3] = np.eye(3)
+    basis[3:, 3:] = tangent_basis(pose.t)
+    return basis
+
+
 def _on_lines(view: ThinnedMap, projector: ProjectorModel, pose: RigidTransform) -> RigidTransform:
     for _ in range(ROUNDS):
         pose = _equations(view, projector, pose).moved(pose, 0.0)
@@ -137,9 +145,7 @@ def _equations(view: ThinnedMap, projector: ProjectorModel, pose: RigidTransform
 
 
 def _linear(found: Triangulated, pose: RigidTransform, noise: float) -> _Equations:
-    basis = np.zeros((6, 5))
-    basis[:3, :3] = np.eye(3)
-    basis[3:, 3:] = tangent_basis(pose.t)
+    basis = pose_directions(pose)
     r = found.across / noise
     weight = np.where(found.good, 1 / (1 + (r / FAR) ** 2) ** 2, 0.0)
     J = np.concatenate([basis.T @ found.by_pose[:6], found.by_pose[6:]]) / noise

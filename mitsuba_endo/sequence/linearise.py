@@ -84,21 +84,38 @@ def triangulate(
     good &= Y[2] > 0
     Y = np.where(good, Y, np.array([[0.0], [0.0], [1.0]]))
     q, gradient = _projection(projector, Y)
-    by_range = np.einsum("ijn,jn->in", gradient, at.turned)
-    slope = np.sqrt((by_range**2).sum(0)) + 1e-12
-    tangent = by_range / slope
+    slope, tangent = _along(gradient, at.turned)
     normal = np.stack([-tangent[1], tangent[0]])
-    centre = np.array(projector.centre, float)[:, None]
-    # d q / d (turn, shift) = G [-(R X) x, 1]: its rows are (R X) x g and g.
-    rows = []
-    for direction in (normal, tangent):
-        g = np.einsum("in,ijn->jn", direction, gradient)
-        rows.append(np.concatenate([cross(turned, g), g]))
-    focal = dot2(normal, q - centre)
+    focal = dot2(normal, q - np.array(projector.centre, float)[:, None])
     return Triangulated(
         good, distance, slope, dot2(normal, sample.q - q),
-        np.concatenate([rows[0], focal[None]]), -rows[1] / slope,
+        np.concatenate([_by_pose(gradient, normal, turned), focal[None]]),
+        -_by_pose(gradient, tangent, turned) / slope,
     )  # fmt: skip
+
+
+def range_response(projector: ProjectorModel, pose: RigidTransform, points: Floats) -> Floats:
+    """Return how ranges found at points (3, N) of the camera's frame depend on the pose (6, N)."""
+    turned = pose.R @ points
+    _, gradient = _projection(projector, turned + pose.t[:, None])
+    slope, tangent = _along(gradient, turned / np.sqrt(dot(turned, turned)))
+    return -_by_pose(gradient, tangent, turned) / slope
+
+
+def _along(gradient: Floats, rays: Floats) -> tuple[Floats, Floats]:
+    """Return how fast (N,) and where to (2, N) coordinates go with the range along rays (3, N)."""
+    by_range = np.einsum("ijn,jn->in", gradient, rays)
+    slope = np.sqrt((by_range**2).sum(0)) + 1e-12
+    return slope, by_range / slope
+
+
+def _by_pose(gradient: Floats, direction: Floats, turned: Floats) -> Floats:
+    """Return the derivative (6, N) of coordinates along directions (2, N) by turn and shift.
+
+    d q / d (turn, shift) = G [-(R X) x, 1]: a row g of G gives (R X) x g and g.
+    """
+    g = np.einsum("in,ijn->jn", direction, gradient)
+    return np.concatenate([cross(turned, g), g])
 
 
 def dot2(a: Floats, b: Floats) -> Floats:

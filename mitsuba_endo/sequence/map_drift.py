@@ -3,11 +3,11 @@
 Each frame is placed on what some n frames before it made, and adds a share of 1 / n to what later
 frames are placed on. So its own error enters the map's by 1 / n, and errors of different frames
 are independent: a random walk, of which every fused frame is a step. The first frame made the map
-alone: its error counts whole, and is as large as that of the next one.
+alone: its projector's error counts whole, and that of its camera is as large as the next one's.
 
 A map that was made with a wrong pose of the projector is bent so that later frames find the same
-wrong pose. So the walk is one of both poses; the error of the baseline's length is one of scale,
-which the way of the camera multiplies.
+wrong pose. So the walk is one of both poses, and a wrong pose of the projector bends the way of the
+camera (:mod:`.bending`).
 """
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ..geometry.transforms import RigidTransform
 from ..start.vectors import skew
-from .linearise import Poses
 
 Floats = NDArray[np.float64]
 
@@ -23,28 +22,36 @@ Floats = NDArray[np.float64]
 class MapDrift:
     """Covariance of what the newest piece of the map makes frames' poses err by."""
 
-    def __init__(self) -> None:
+    def __init__(self, first: Floats) -> None:
+        """Begin with the covariance (6, 6) of the first frame's projector pose."""
+        self._first = first
         self._covariance: Floats | None = None
         """(12, 12): step of the projector, rotation about the world's origin, shift there."""
         self._places = [np.zeros(3)]
         """Of the cameras of fused frames."""
 
-    def fused(self, poses: Poses, own: Floats, reach: float) -> None:
+    def fused(self, pose: RigidTransform, own: Floats, bent: Floats, reach: float) -> None:
         """Take a frame that enters the map.
 
         Args:
-            poses: where it was placed.
+            pose: where it was placed, world_from_camera.
             own: (12, 12) covariance of its step against the map, see :func:`in_world`.
+            bent: (6, 6) step of the camera, in its own axes, that a step of the projector makes on
+                the way from the frame that was fused before.
             reach: how far, the map's unit, cameras may be apart that see the same surface.
         """
-        place = poses.world_from_camera.t
-        near = np.linalg.norm(np.array(self._places) - place, axis=1) < reach
-        to_origin = _felt_at(-place)
+        near = np.linalg.norm(np.array(self._places) - pose.t, axis=1) < reach
+        to_origin = _felt_at(-pose.t)
         step = to_origin @ own @ to_origin.T
-        before = step if self._covariance is None else self._covariance
-        way = _scaled(place - self._places[-1], poses.projector_from_camera)
+        before = self._covariance
+        if before is None:
+            before = step.copy()
+            before[:6], before[:, :6] = 0.0, 0.0
+            before[:6, :6] = self._first
+        way = np.eye(12)
+        way[6:, :6] = to_origin[6:, 6:] @ np.kron(np.eye(2), pose.R) @ bent
         self._covariance = way @ before @ way.T + step / (near.sum() + 1) ** 2
-        self._places.append(place)
+        self._places.append(pose.t)
 
     def at(self, world_from_camera: RigidTransform) -> Floats:
         """Return the covariance (12, 12) of the steps of projector and camera of a frame there."""
@@ -65,12 +72,4 @@ def _felt_at(t: Floats) -> Floats:
     """Return (12, 12): a rotation about the origin and a shift there, as felt at ``t``."""
     out = np.eye(12)
     out[9:, 6:9] = -skew(t)
-    return out
-
-
-def _scaled(way: Floats, projector_from_camera: RigidTransform) -> Floats:
-    """Return (12, 12): an error of the baseline's length shifts what lies a ``way`` on."""
-    t = projector_from_camera.t
-    out = np.eye(12)
-    out[9:, 3:6] = np.outer(way, t) / (t @ t)
     return out

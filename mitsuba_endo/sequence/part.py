@@ -11,6 +11,8 @@ from ..geometry.cameras import CameraModel
 from ..geometry.laws import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..start.range_image import RangeImage
+from .bending import bending
+from .epipolar_focal import pose_directions
 from .gate import fault
 from .keyframes import Keyframes
 from .linearise import Poses, orthonormal
@@ -19,7 +21,7 @@ from .placement import Placement, Prior, place
 from .projector_prior import ProjectorDrift
 from .range_images import Ranged, ranged
 from .shared_errors import SharedErrors
-from .view import ThinnedMap
+from .view import PixelSample, ThinnedMap
 
 Floats = NDArray[np.float64]
 
@@ -85,8 +87,8 @@ class Part:
         self._before: tuple[int, Poses] | None = None
         self._last = number, Poses(RigidTransform.identity(), projector_pose)
         self._covariance = np.zeros((6, 6))
-        self._drift = MapDrift()
-        self._fused_at, self._searches = number, 0
+        self._drift = MapDrift(self._known_alone(view, Prior(projector_pose, np.zeros((6, 6)))))
+        self._searches = 0
         seen = ranged(view, self._last[1], setup.projector, noise)
         self._fuse(number, seen)
         self._keep(number, self._last[1], seen)
@@ -105,7 +107,9 @@ class Part:
             ]
             sound = [found for found in placed if not fault(found)]
             if sound:
-                return self._accepted(number, view, min(sound, key=lambda found: found.misfit))
+                return self._accepted(
+                    number, view, sample, min(sound, key=lambda found: found.misfit)
+                )
             reason = fault(placed[-1]) if placed else reason
         return reason
 
@@ -149,7 +153,9 @@ class Part:
         seen = ranged(view, found.poses, self.setup.projector, found.noise)
         return _image(seen), found.poses.projector_from_camera
 
-    def _accepted(self, number: int, view: ThinnedMap, found: Placement) -> Tracked:
+    def _accepted(
+        self, number: int, view: ThinnedMap, sample: PixelSample, found: Placement
+    ) -> Tracked:
         """Take over a placement: next frames begin there, and the map may grow."""
         setup, poses = self.setup, found.poses
         own = in_world(self._spread.widened(found), poses.world_from_camera)
@@ -159,17 +165,39 @@ class Part:
             seen = ranged(view, poses, setup.projector, found.noise)
             if keyframe:
                 self._keep(number, poses, seen)
+            self._drift.fused(
+                poses.world_from_camera, own, self._bent(sample, found),
+                self.keyframes.kept[0].pyramid.unit,
+            )  # fmt: skip
             self._fuse(number, seen)
-            self._drift.fused(poses, own, self.keyframes.kept[0].pyramid.unit)
         consecutive = number == self._last[0] + 1
         self._before = self._last if consecutive else None
         self._last, self.noise, self._searches = (number, poses), found.noise, 0
         self._covariance = own[:6, :6]
         return Tracked(poses, own + self._drift.at(poses.world_from_camera), found, keyframe)
 
+    def _known_alone(self, view: ThinnedMap, prior: Prior) -> Floats:
+        """Return the covariance (6, 6) of a projector pose that lines alone tell.
+
+        The length of its translation is given.
+        """
+        sample, nowhere = view.sample(self.setup.projector), Volume(self.setup.voxel)
+        start = Poses(RigidTransform.identity(), prior.mean)
+        found = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
+        information = np.linalg.inv(found.covariance[:6, :6])
+        scatter = information @ found.clustered[:6, :6] @ information
+        told = pose_directions(prior.mean)
+        inverse = np.linalg.inv(told.T @ information @ told)
+        return told @ inverse @ (told.T @ scatter @ told) @ inverse @ told.T
+
+    def _bent(self, sample: PixelSample, found: Placement) -> Floats:
+        """Return what a wrong pose of the projector has done since the last fused frame."""
+        setup, poses = self.setup, found.poses
+        return bending(sample, found.found, poses, self._fused_pose, setup.projector, self.volume)
+
     def _fuse(self, number: int, seen: Ranged) -> None:
         self.volume.integrate(seen.frame)
-        self._fused_at = number
+        self._fused_at, self._fused_pose = number, seen.frame.world_from_camera
         self.fused += 1
 
     def _keep(self, number: int, poses: Poses, seen: Ranged) -> None:

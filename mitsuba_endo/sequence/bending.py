@@ -1,0 +1,52 @@
+"""How a wrong pose of the projector bends the way of the camera.
+
+A wrong pose distorts every range image alike, seen from its camera. When the camera moves on, the
+same places are distorted otherwise, and the frame that fits best is turned and shifted by a little
+more than the camera was. An error of the baseline's length alone makes the way longer in
+proportion; the other five bend it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fusion import Volume
+from ..geometry.laws import ProjectorModel
+from ..geometry.transforms import RigidTransform
+from ..start.vectors import dot
+from .linearise import Poses, Triangulated, against_map, range_response
+from .view import PixelSample
+
+Floats = NDArray[np.float64]
+
+
+def bending(
+    sample: PixelSample,
+    found: Triangulated,
+    poses: Poses,
+    before: RigidTransform,
+    projector: ProjectorModel,
+    volume: Volume,
+) -> Floats:
+    """Return the step of the camera (6, 6) that a step of the projector's pose makes by a motion.
+
+    Args:
+        sample: of a frame.
+        found: its points.
+        poses: where it is.
+        before: world_from_camera of an earlier frame.
+        projector: with its focal length.
+        volume: the map, which gives the normals.
+    """
+    seen = against_map(sample, found, poses.world_from_camera, volume)
+    rays = seen.by_poses[6:]  # w . (X x n) + dt . n
+    here = seen.cosine * found.range_by_pose
+    points = sample.rays * found.range
+    motion = before.inverse() @ poses.world_from_camera
+    earlier = motion.R @ points + motion.t[:, None]
+    normal = motion.R @ rays[3:]
+    cosine = dot(normal, earlier) / np.sqrt(dot(earlier, earlier))
+    there = cosine * range_response(projector, poses.projector_from_camera, earlier)
+    A = (rays * seen.known) @ rays.T
+    A[np.arange(6), np.arange(6)] += 1e-9 * np.trace(A)
+    step: Floats = np.linalg.solve(A, (rays * seen.known) @ (there - here).T).astype(np.float64)
+    return step
