@@ -137,7 +137,7 @@ def _alone(map_: CorrespondenceMap, rig: Rig) -> Calibration:
     scale = rig.scale.model_copy(update={"known_distance": known})
     own = rig.model_copy(update={"camera": camera, "scale": scale, "drift": None})
     small = CorrespondenceMap(map_.q[::step, ::step], map_.name)
-    return calibrate([small], own, Options(jackknife=False))
+    return calibrate([small], own, Options(jackknife=False, check_model=False))
 
 
 def _calibration_of(found: Calibration) -> tuple[ProjectorModel, RigidTransform]:

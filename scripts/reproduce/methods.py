@@ -19,7 +19,7 @@ from mitsuba_endo.solve.options import Options
 from .capture import read_inputs
 from .fusion import Fusion, fuse
 
-LEAN = Options(jackknife=False)
+LEAN = Options(jackknife=False, check_model=False)
 """The jackknife serves intervals, which most experiments do not look at."""
 
 
