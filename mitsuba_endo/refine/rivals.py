@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import SIDE, Image
-from .iterate import DARK, Comparison, Refined, robust_weight
+from .iterate import DARK, FIRST_BLUR, Comparison, Refined, robust_weight
 from .pattern_image import PatternImage
 from .windows import Windows
 
@@ -18,9 +18,6 @@ MOST = 8
 FARTHEST = 0.125
 """Share of the pattern's smaller side within which rivals are sought: farther slips do not happen
 pixel by pixel."""
-BLUR = 0.6
-"""Blur of the patterns that are compared, pattern pixels. Chosen: that with which a refinement
-begins."""
 WIDER = 2.0
 """Windows of the comparison over those of the regression: they must hold some of the code."""
 
@@ -34,7 +31,7 @@ def rival_shifts(pattern: PatternImage) -> NDArray[np.float32]:
     """
     x = np.arange(pattern.width, dtype=np.float32)
     y = np.arange(pattern.height, dtype=np.float32)
-    value = pattern.brightness(np.stack(np.meshgrid(x, y), -1), BLUR)
+    value = pattern.brightness(np.stack(np.meshgrid(x, y), -1), FIRST_BLUR)
     value = value - value.mean()
     padded = [2 * n for n in value.shape]
     power = np.abs(np.fft.rfft2(value, padded)) ** 2
