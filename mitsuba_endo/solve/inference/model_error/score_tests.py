@@ -94,6 +94,9 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
     seen &= np.diag(information) > variance / np.array([limit for *_, limit, _ in named]) ** 2
     named = [n for n, is_seen in zip(named, seen, strict=True) if is_seen]
     W, information, score = W[:, seen], information[np.ix_(seen, seen)], score[seen]
+    # Together, values may have directions that the data hardly see although they see each.
+    limits = np.array([limit for *_, limit, _ in named])
+    information = information + np.diag(variance / limits**2)
     step, rank = _joint(information, score)
     gain = float(-score @ step)
     before = residual_correlation(extended.result)
