@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from mitsuba_endo.geometry.transforms import angle_between, rotation_angle
 from mitsuba_endo.records.correspondence import load_map
 from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig, Scale
+from mitsuba_endo.records.solution import Solution
 from mitsuba_endo.solve.calibrate import calibrate
 
 from .report import Figure
@@ -34,6 +36,12 @@ def _capture(path: Path) -> list[Figure]:
     focal = found.projector.focal.value
     if pose is None or not isinstance(focal, float):
         raise RuntimeError(f"{path.name}: focal length or pose was not determined")
+    std = found.projector.focal.std
+    error = Rotation.from_matrix(pose.R @ arrays["R"].T).as_rotvec(), pose.t - arrays["t"].ravel()
+    of_pose = np.abs(np.concatenate(error)) / _std(found)
+    of_focal = (
+        abs(focal - float(arrays["K_proj"][0, 0])) / std if isinstance(std, float) else np.inf
+    )
     name = path.stem.removesuffix("_small").replace("_", " ")
     true_focal = float(arrays["K_proj"][0, 0])
     turned = np.degrees(rotation_angle(pose.R @ arrays["R"].T))
@@ -42,7 +50,15 @@ def _capture(path: Path) -> list[Figure]:
         _figure(f"{name}: focal error", 100 * abs(focal / true_focal - 1), "%", "lower", 1),
         _figure(f"{name}: rotation error", float(turned), "deg", "lower", 0.3),
         _figure(f"{name}: translation direction error", float(moved), "deg", "lower", 2),
-    ]
+        _figure(f"{name}: focal error, in deviations", float(of_focal), "", "lower", 1.96),
+        _figure(f"{name}: pose error, worst component", float(of_pose.max()), "",
+                "lower", 3),
+    ]  # fmt: skip
+
+
+def _std(found: Solution) -> NDArray:
+    """Return the stated deviations (6,) of the projector's pose."""
+    return np.array(found.frames[0].projector_from_camera.std or [1e-300] * 6)
 
 
 def _rig(arrays: dict[str, NDArray]) -> Rig:
