@@ -2,11 +2,15 @@
 
 from typing import Any
 
-from mitsuba_endo.geometry.laws import LAWS, ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import (
+    PROJECTION_MODELS,
+    ProjectorModel,
+    projector_model,
+)
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
 from mitsuba_endo.rendering.coordinates import project_direction
 from mitsuba_endo.rendering.keys import DISTORTION
-from mitsuba_endo.rendering.untyped import dr, mi
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 
 from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 
@@ -33,7 +37,7 @@ class DoeProjector:
 
      * - law
        - |string|
-       - ``pinhole`` or ``direction_cosine``, see :mod:`mitsuba_endo.geometry.laws`.
+       - ``pinhole`` or ``direction_cosine``, see :mod:`mitsuba_endo.geometry.projection_models`.
          (Default: ``pinhole``)
        -
 
@@ -102,8 +106,10 @@ class DoeProjector:
         mi.Emitter.__init__(self, props)
         self.m_flags = mi.EmitterFlags.DeltaPosition
         self.law = str(props.get("law", "pinhole"))
-        if self.law not in LAWS:
-            raise RuntimeError(f'unknown "law" {self.law!r}, expected one of {", ".join(LAWS)}')
+        if self.law not in PROJECTION_MODELS:
+            raise RuntimeError(
+                f'unknown "law" {self.law!r}, expected one of {", ".join(PROJECTION_MODELS)}'
+            )
         self.pattern = props.get_texture("pattern", 1.0)
         self.width, self.height = self._read_size(props)
         self.focal = read_number(props, "focal", positive=True)
@@ -167,7 +173,7 @@ class DoeProjector:
         model = self.model()
         u, v, front = project_direction(model, x, y, z, _MIN_COSINE)
         x, y, z = dr.select(front, x, 0.0), dr.select(front, y, 0.0), dr.select(front, z, 1.0)
-        unfolded = model.distortion.unfolded(*LAWS[self.law].normalise(x, y, z))
+        unfolded = model.distortion.unfolded(*PROJECTION_MODELS[self.law].normalise(x, y, z))
         return (
             mi.Float(u),
             mi.Float(v),

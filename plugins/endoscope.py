@@ -4,7 +4,7 @@ from typing import Any
 
 from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
-from mitsuba_endo.rendering.untyped import dr, mi
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 
 from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 

@@ -4,8 +4,8 @@ from typing import Any
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.rendering.axes import swap_axes
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 from mitsuba_endo.rendering.rays import pixel_rays
-from mitsuba_endo.rendering.untyped import dr, mi
 
 from . import doe_projector
 from .variants import is_scalar, variant_class

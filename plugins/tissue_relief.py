@@ -3,7 +3,7 @@
 from typing import Any
 
 from mitsuba_endo.capture.relief import relief
-from mitsuba_endo.rendering.untyped import dr, mi
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 
 from .variants import make_opaque, variant_class
 from .vessels import field_frame, to_field

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mitsuba_endo.rendering.axes import is_rigid
-from mitsuba_endo.rendering.untyped import dr, mi
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 
 _NOT_COPIED = ("__dict__", "__weakref__")
 

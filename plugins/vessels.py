@@ -4,7 +4,7 @@ from typing import Any
 
 from mitsuba_endo.capture.solid_fields import field_from_tissue
 from mitsuba_endo.capture.vessels import ABSORPTION, vessel_density
-from mitsuba_endo.rendering.untyped import mi
+from mitsuba_endo.rendering.mitsuba_modules import mi
 
 from .variants import make_opaque, variant_class
 

@@ -14,7 +14,7 @@ from rich.progress import track
 
 from mitsuba_endo import backend
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Focal

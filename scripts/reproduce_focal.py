@@ -4,7 +4,7 @@ The inside of a sphere, which of all shapes tells a DOE projector's focal length
 starting focal length is 10 % too long. Errors of a decoder as in Table I. The cameras of the four
 frames start at one place, since a sphere's patches cannot be registered. RMSE of the
 point-to-surface distance in mm after rigid alignment, with the first baseline known, for either
-projector law.
+projection model.
 """
 
 from itertools import product

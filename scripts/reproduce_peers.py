@@ -1,6 +1,6 @@
 """Peers on the same correspondences, from the same wrong focal length.
 
-One frame of the stomach phantom under either projector law, 0.3 px Gaussian noise and 1 % gross
+One frame of the stomach phantom under either projection model, 0.3 px Gaussian noise and 1 % gross
 errors, focal length 10 % too long. **pycolmap**: bundle adjustment with the projector as a pinhole
 camera, and as a fisheye camera frozen to the sine law. **epipolar**: this package's start alone, a
 robust fit of the epipolar geometry, and triangulation. **Adam**: the published method. Errors are
@@ -32,7 +32,7 @@ METHODS = {
     "pycolmap, sine fisheye": peers.pycolmap_fisheye,
     "epipolar + triangulation": peers.epipolar,
 }
-LAWS = ("pinhole", "direction_cosine")
+PROJECTION_MODELS = ("pinhole", "direction_cosine")
 
 
 def main(out: Out = OUT / "peers", quick: Quick = False) -> None:
@@ -41,7 +41,7 @@ def main(out: Out = OUT / "peers", quick: Quick = False) -> None:
     seeds, width = (2, 48) if quick else (5, 140)
     noise = Plain(sigma=0.3, outliers=0.01)
     truths, captures = {}, {}
-    for law in LAWS:
+    for law in PROJECTION_MODELS:
         for seed in range(seeds):
             truth = views_of(stomach_mesh(seed), 1, seed, law=law, width=width, play=0.0)
             folder = out / "captures" / f"{law}_{seed}"
@@ -54,7 +54,7 @@ def main(out: Out = OUT / "peers", quick: Quick = False) -> None:
         with solvers(1) as pool:
             answers = {k: answer(pool.submit(method, c.inputs)) for k, c in captures.items()}
         found = {k: f for k, f in answers.items() if f is not None}
-        for law in LAWS:
+        for law in PROJECTION_MODELS:
             mine = {k: f for k, f in found.items() if k[0] == law}
             if not mine:
                 continue

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from mitsuba_endo import backend
 from tests.solve.monte_carlo import Sample, many_scenes, one_scene
-from tests.solve.problems import LAWS
+from tests.solve.problems import PROJECTION_MODELS
 
 
 def _print(title: str, sample: Sample) -> None:
@@ -25,7 +25,7 @@ def main() -> None:
     seeds = parser.parse_args().seeds
     backend.use("llvm_ad_rgb")
     with threadpool_limits(1, "blas"):
-        for law in LAWS:
+        for law in PROJECTION_MODELS:
             _print(f"One scene, {law}", one_scene(law, seeds))
         _print("One scene, pinhole, 10 % outliers", one_scene("pinhole", seeds, 0.1))
         _print("Random rigs, both laws", many_scenes(seeds))

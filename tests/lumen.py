@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mitsuba_endo import backend
 from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.rendering.decoder_errors import like_decoded

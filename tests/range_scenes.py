@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
+from mitsuba_endo.initialisation.registration import RangeImage, Registration
 from mitsuba_endo.shapes import Mesh, make_shape
-from mitsuba_endo.start.registration import RangeImage, Registration
 
 Floats = NDArray[np.float64]
 Surface = Callable[[Floats, Floats], Floats]

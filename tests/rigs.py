@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 Surface = Callable[[NDArray[np.float64]], NDArray[np.float64]]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..rendering import keys
-from ..rendering.untyped import mi
+from ..rendering.mitsuba_modules import mi
 from .diffusion import scattering_albedo
 from .settings import Tissue
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .. import backend
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..shapes.mesh import Mesh
 from .checks import check_mesh, check_pattern

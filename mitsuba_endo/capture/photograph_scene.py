@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CAMERAS, CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..rendering import keys
 from ..rendering.axes import to_world_from_pose
+from ..rendering.mitsuba_modules import mi
 from ..rendering.synthetic import Hits, MeshScene
-from ..rendering.untyped import mi
 from ..shapes.mesh import Mesh
 from .checks import check_view
 from .creases import with_creases

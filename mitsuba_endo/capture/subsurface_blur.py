@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.untyped import dr, mi
+from ..rendering.mitsuba_modules import dr, mi
 from .diffusion import VARIANCES, profile_weights
 
 _TAPS = 6

@@ -13,7 +13,7 @@ from pydantic import (
 )
 
 from ..geometry.cameras import CAMERAS
-from ..geometry.laws import LAWS
+from ..geometry.projection_models import PROJECTION_MODELS
 from ..reading.trees import read_yaml
 from ..records.validation import validate
 from .capture_ranges import CaptureRanges
@@ -126,7 +126,7 @@ class ProjectorRanges(Section):
     @field_validator("law")
     @classmethod
     def _known_law(cls, value: Range) -> Range:
-        return _among(value, LAWS, "projector law")
+        return _among(value, PROJECTION_MODELS, "projection model")
 
     @field_validator("distortion")
     @classmethod

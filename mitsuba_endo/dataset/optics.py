@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from ..errors import InputError
 from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.endoscope import aimed_projector
-from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.projection_models import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
 from .config import CameraRanges, ProjectorRanges
 

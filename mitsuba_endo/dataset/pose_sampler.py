@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.endoscope import Endoscope
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..rendering.synthetic import MeshScene
 from ..shapes.mesh import Mesh
 from .config import PoseRules, ProjectorRanges

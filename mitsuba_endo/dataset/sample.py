@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..capture.photograph import Photograph, load_scene, take_photograph
 from ..decoding.grid_pattern import CodedGrid
 from ..geometry.endoscope import Endoscope
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..records.rig import Camera
 from ..records.solution import (

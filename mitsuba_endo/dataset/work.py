@@ -59,7 +59,7 @@ def prepare() -> None:
     from threadpoolctl import threadpool_limits
 
     backend.use(VARIANT)
-    from ..rendering.untyped import dr
+    from ..rendering.mitsuba_modules import dr
 
     # Workers share the cores among themselves, and one thread adds up light in one order. The
     # deadlock of EXR files with one thread concerns Mitsuba's own reading, which workers never do.

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from .cameras import CameraModel
-from .laws import ProjectorModel
+from .projection_models import ProjectorModel
 from .transforms import RigidTransform
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from ..geometry.cameras import CameraModel
 from ..geometry.endoscope import Endoscope, aimed_projector
-from ..geometry.laws import projector_model
+from ..geometry.projection_models import projector_model
 from ..geometry.transforms import RigidTransform
 from ..shapes import Mesh, make_shape
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from ..geometry.laws import LAWS, ProjectorModel, projector_model
+from ..geometry.projection_models import PROJECTION_MODELS, ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
 from .validation import Length, Matrix3, Real, Record, Size, Vector2, Vector3
 
@@ -88,9 +88,9 @@ class Projector(Record):
     @field_validator("law")
     @classmethod
     def _known_law(cls, value: str) -> str:
-        if value != AUTO_LAW and value not in LAWS:
-            names = ", ".join([*LAWS, AUTO_LAW])
-            raise ValueError(f"unknown projector law '{value}'; choose from {names}")
+        if value != AUTO_LAW and value not in PROJECTION_MODELS:
+            names = ", ".join([*PROJECTION_MODELS, AUTO_LAW])
+            raise ValueError(f"unknown projection model '{value}'; choose from {names}")
         return value
 
     @field_validator("focal", mode="before")

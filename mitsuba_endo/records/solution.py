@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from ..files import atomic_path
-from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.projection_models import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
 from ..reading.trees import read_json
 from .rig import Camera

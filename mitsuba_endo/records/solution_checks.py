@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, shown
-from ..geometry.laws import LAWS
+from ..geometry.projection_models import PROJECTION_MODELS
 from .rig import MAX_PROJECTOR_DISTORTION
 from .solution import Estimate, PoseEstimate, Solution
 from .validation import LARGEST
@@ -31,7 +31,7 @@ def check_solution(solution: Solution, source: str) -> Solution:
 def _faults(solution: Solution) -> Iterator[tuple[str, str]]:
     """Yield fields and what is wrong with them."""
     projector, surface = solution.projector, solution.surface
-    if projector.law not in LAWS:
+    if projector.law not in PROJECTION_MODELS:
         yield "projector.law", f"unknown law {shown(projector.law)}"
     for name, count in (("focal", 0), ("aspect", 0), ("centre", 2), ("distortion", None)):
         yield from _estimate(f"projector.{name}", getattr(projector, name), count)

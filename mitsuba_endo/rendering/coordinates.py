@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
+from .mitsuba_modules import dr, mi
 from .moving_mesh import vector
-from .untyped import dr, mi
 
 
 class Projects(Protocol):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import keys
-from .untyped import dr, mi
+from .mitsuba_modules import dr, mi
 
 
 class MovingMesh:

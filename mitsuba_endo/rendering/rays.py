@@ -3,7 +3,7 @@
 from typing import Any
 
 from .axes import fraction_from_pixel
-from .untyped import dr, mi
+from .mitsuba_modules import dr, mi
 
 
 def pixel_rays(sensor: Any) -> tuple[Any, int, int]:

@@ -46,7 +46,7 @@ def render_capture(loaded: LoadedScene, spp: int = 64, seed: int = 0, name: str 
         seed: seed of the image's noise.
         name: name of the frame in the truth.
     """
-    from .untyped import mi
+    from .mitsuba_modules import mi
 
     sensor = loaded.sensor()
     image = np.array(mi.render(loaded.scene, sensor=sensor, spp=spp, seed=seed), np.float32)
@@ -64,7 +64,7 @@ def render_capture(loaded: LoadedScene, spp: int = 64, seed: int = 0, name: str 
 
 def projector_coordinates(loaded: LoadedScene) -> NDArray[np.float32]:
     """Return the (H, W, 5) channels of the integrator ``projector_coords``."""
-    from .untyped import mi
+    from .mitsuba_modules import mi
 
     settings = {"type": "projector_coords", "projector": keys.PROJECTOR}
     integrator: Any = mi.load_dict(settings)
@@ -73,8 +73,8 @@ def projector_coordinates(loaded: LoadedScene) -> NDArray[np.float32]:
 
 def camera_normals(loaded: LoadedScene) -> NDArray[np.float32]:
     """Return (H, W, 3) shading normals in the camera's frame, towards the camera; NaN = none."""
+    from .mitsuba_modules import dr
     from .rays import pixel_rays
-    from .untyped import dr
 
     ray, width, height = pixel_rays(loaded.sensor())
     si = loaded.scene.ray_intersect(ray)

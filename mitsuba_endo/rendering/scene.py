@@ -13,7 +13,7 @@ import numpy as np
 from .. import backend
 from ..errors import InputError
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel, projector_model
+from ..geometry.projection_models import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
 from ..litter import scratch_folder
 from ..reading.regular import is_file
@@ -99,7 +99,7 @@ class LoadedScene:
         return Mesh(vertices, faces, uv if len(uv) else None)
 
     def _values(self) -> Any:
-        from .untyped import mi
+        from .mitsuba_modules import mi
 
         return mi.traverse(self.scene)
 
@@ -140,7 +140,7 @@ def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[s
         InputError: as :func:`load_scene`, which demands a camera and a projector besides.
     """
     backend.ensure()
-    from .untyped import mi
+    from .mitsuba_modules import mi
 
     path = find_scene(source)
     root = _root(path)

@@ -20,7 +20,7 @@ def scene_mesh(source: str | Path) -> Mesh:
     Raises:
         InputError: no such file, a broken scene, or no triangle mesh in it.
     """
-    from .untyped import mi
+    from .mitsuba_modules import mi
 
     scene, _ = open_scene(source)
     meshes = [shape for shape in scene.shapes() if isinstance(shape, mi.Mesh)]
@@ -38,7 +38,7 @@ def scene_mesh(source: str | Path) -> Mesh:
 
 
 def _arrays(mesh: Any) -> tuple[np.ndarray, np.ndarray]:
-    from .untyped import mi
+    from .mitsuba_modules import mi
 
     values = mi.traverse(mesh)
     vertices = np.array(values[keys.VERTEX_POSITIONS], np.float64).reshape(-1, 3)

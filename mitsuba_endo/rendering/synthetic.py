@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from .coordinates import FrameModel, Pose, distances, project_along
+from .mitsuba_modules import mi
 from .moving_mesh import MovingMesh, cast_into, vector
-from .untyped import mi
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fusion import Volume
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..start.vectors import dot
+from ..initialisation.vectors import dot
 from .linearise import Poses, Triangulated, against_map, range_response
 from .view import PixelSample
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import Calibration
 from ..records.correspondence import CorrespondenceMap

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform, tangent_basis
 from .linearise import Triangulated, orthonormal, triangulate
 from .placement import FAR, noise_of

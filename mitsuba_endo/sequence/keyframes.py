@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.transforms import RigidTransform, rotation_angle
-from ..start.pairs import register_pair
-from ..start.range_image import RangeImage, RangePyramid, typical_range
+from ..initialisation.pairs import register_pair
+from ..initialisation.range_image import RangeImage, RangePyramid, typical_range
 from .linearise import Poses
 
 FARTHEST = 0.15

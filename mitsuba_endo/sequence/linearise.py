@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from ..fusion import Volume
 from ..fusion.interpolate import interpolate
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..start.epipolar import residuals
-from ..start.triangulate import ranges
-from ..start.vectors import cross, dot
+from ..initialisation.epipolar import residuals
+from ..initialisation.triangulate import ranges
+from ..initialisation.vectors import cross, dot
 from .view import PixelSample
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.transforms import RigidTransform
-from ..start.vectors import skew
+from ..initialisation.vectors import skew
 
 Floats = NDArray[np.float64]
 

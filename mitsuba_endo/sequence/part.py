@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from ..fusion import Volume
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..start.range_image import RangeImage
+from ..initialisation.range_image import RangeImage
 from .bending import bending
 from .epipolar_focal import pose_directions
 from .gate import fault

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fusion import Volume
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..solve.costs.drift import step_between
 from .linearise import AgainstMap, Poses, Triangulated, against_map, triangulate

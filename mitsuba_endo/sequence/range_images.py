@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fusion import RangeFrame
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from .linearise import Poses, Triangulated, triangulate
 from .placement import FAR
 from .view import PixelSample, ThinnedMap

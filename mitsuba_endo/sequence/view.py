@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
+from ..initialisation.clean import clean_map
+from ..initialisation.epipolar import Bearings, bearings
 from ..records.correspondence import CorrespondenceMap
-from ..start.clean import clean_map
-from ..start.epipolar import Bearings, bearings
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -231,7 +231,7 @@ def provenance(solution: Solution) -> str:
     facts = "".join(
         f"<tr><th>{name}</th><td>{escape(str(text))}</td></tr>"
         for name, text in (
-            ("Projector law", law), ("Seed", seed), ("Times", seconds), ("Versions", versions),
+            ("Projection model", law), ("Seed", seed), ("Times", seconds), ("Versions", versions),
         )
     )  # fmt: skip
     details = "".join(

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 from ..files import atomic_path
 from ..geometry.cameras import CameraModel
-from ..geometry.laws import ProjectorModel
+from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..rendering import keys
 from ..rendering.axes import to_world_from_pose

@@ -6,7 +6,7 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from .. import backend
-from ..geometry.laws import LAWS
+from ..geometry.projection_models import PROJECTION_MODELS
 from ..records.calibration import Calibration
 from ..records.checkpoint import Checkpoint
 from ..records.consistency import as_maps
@@ -74,7 +74,7 @@ def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:
     """Return the projection models to solve under."""
     if resume is not None:
         return [resume.law]
-    return list(LAWS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
+    return list(PROJECTION_MODELS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
 
 
 def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..initialisation.registration import RangeImage, Registration, register_frames
+from ..initialisation.result import Start
 from ..records.calibration import TraceRow
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut, Outcome
-from ..start.registration import RangeImage, Registration, register_frames
-from ..start.result import Start
 from .costs.problem import Problem, make_problem
 from .costs.registry import priors_of
 from .frames.alone import solve_alone

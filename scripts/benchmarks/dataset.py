@@ -87,7 +87,7 @@ def _make(config: Config, out: Path, count: int) -> Progress:
 def prepare_stopwatch() -> None:
     """Prepare a worker and put a stopwatch around mi.render."""
     prepare()
-    from mitsuba_endo.rendering.untyped import dr, mi
+    from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 
     real = mi.render
 

@@ -16,7 +16,7 @@ from mitsuba_endo.capture.photograph import photograph
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Light, Tissue
 from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.rendering.synthetic import MeshScene
 from mitsuba_endo.shapes import Mesh, make_shape

@@ -7,7 +7,7 @@ import numpy as np
 
 from mitsuba_endo.rendering import keys
 from mitsuba_endo.rendering.axes import to_world_from_pose
-from mitsuba_endo.rendering.untyped import dr, mi
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 from mitsuba_endo.shapes.bumpy_sheet import BumpySheet
 
 from .report import Figure, alternating

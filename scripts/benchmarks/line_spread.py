@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.capture.photograph import photograph
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Tissue
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.shapes import make_shape
 

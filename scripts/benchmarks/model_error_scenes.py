@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 sys.path.insert(0, str(Path(__file__).parents[2]))

@@ -4,7 +4,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from mitsuba_endo.start.registration import register_frames
+from mitsuba_endo.initialisation.registration import register_frames
 
 from .report import Figure, timed
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.capture.settings import CaptureSettings, Effects, Light, Tissue
 from mitsuba_endo.decoding.grid_pattern import COLOURS, CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.shapes import make_shape
 from mitsuba_endo.shapes.mesh import Mesh

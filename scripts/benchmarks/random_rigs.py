@@ -9,7 +9,7 @@ import numpy as np
 from .report import Figure, timed
 
 sys.path.insert(0, str(Path(__file__).parents[2]))  # the tests' rigs are truth that shares no code
-from tests.start.success import succeeds
+from tests.initialisation.success import succeeds
 
 NAME = "start"
 _figure = partial(Figure, NAME)

@@ -11,7 +11,7 @@ from mitsuba_endo import backend
 from mitsuba_endo.evaluate.shape import Lighting
 from mitsuba_endo.files import atomic_path
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.correspondence import CorrespondenceMap, load_map, save_map

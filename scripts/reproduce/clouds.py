@@ -11,8 +11,8 @@ from mitsuba_endo.evaluate.depth import RayCaster, range_image
 from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.initialisation.given_pose import known_start
 from mitsuba_endo.records.calibration import Calibration, SurfaceEstimate
-from mitsuba_endo.start.known import known_start
 
 from .capture import Truth, read_inputs
 from .pictures import COLOURS

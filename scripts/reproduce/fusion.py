@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.initialisation.registration import RangeImage, Registration, register_frames
 from mitsuba_endo.records.calibration import SurfaceEstimate
-from mitsuba_endo.start.registration import RangeImage, Registration, register_frames
 
 Floats = NDArray[np.float64]
 

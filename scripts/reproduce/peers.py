@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.initialisation.search import search_start
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.start.search import search_start
 
 from .bundle import Model, adjust
 from .capture import read_inputs

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo import backend
 from mitsuba_endo.evaluate.depth import RayCaster
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector
 from mitsuba_endo.shapes import Colon, Polyp, PolypTruth, make_shape
 from mitsuba_endo.shapes.mesh import Mesh

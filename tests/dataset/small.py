@@ -54,7 +54,7 @@ class InThisProcess:
 @contextlib.contextmanager
 def one_thread() -> Iterator[None]:
     """Let Dr.Jit use one thread, as in a worker; other tests would read EXR files for ever."""
-    from mitsuba_endo.rendering.untyped import dr
+    from mitsuba_endo.rendering.mitsuba_modules import dr
 
     before = dr.thread_count()
     dr.set_thread_count(1)

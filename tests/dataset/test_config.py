@@ -45,7 +45,7 @@ def test_scene_files_lie_beside_the_configuration(tmp_path: Path):
         ("camera: {fov: {choose: []}}", "nothing to choose from"),
         ("camera: {distortion: [0, 0, 0, 0, 0, 0]}", "6 distortion coefficients do not fit"),
         ("camera: {model: pinhole}", "unknown camera model 'pinhole'"),
-        ("projector: {law: {choose: [pinhole, x]}}", "unknown projector law 'x'"),
+        ("projector: {law: {choose: [pinhole, x]}}", "unknown projection model 'x'"),
         ("projector: {distortion: [0, 0, 0, 0, 0, 0]}", "6 coefficients"),
         ("pattern: {columns: [3.5, 6]}", "3.5 is not a whole number"),
         ("scenes: []", "at least 1 item"),

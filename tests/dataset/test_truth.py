@@ -5,7 +5,7 @@ from mitsuba_endo.dataset.truth import truth_maps
 from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.endoscope import Endoscope
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.rendering.synthetic import MeshScene
 from mitsuba_endo.shapes.colon import Colon

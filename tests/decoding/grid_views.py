@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.rendering.synthetic import MeshScene
 from mitsuba_endo.shapes import make_shape

@@ -10,7 +10,7 @@ from mitsuba_endo.decoding.stack import decode_stack
 from mitsuba_endo.decoding.stack_images import Stack, estimate_noise
 from mitsuba_endo.decoding.stack_patterns import patterns
 from mitsuba_endo.errors import InputError, NothingDecodedError
-from mitsuba_endo.start.search import search_start
+from mitsuba_endo.initialisation.search import search_start
 from tests.decoding.captures import SIZE, View, inner, photograph, view
 
 

@@ -40,8 +40,8 @@ def test_every_name_on_a_page_exists(page: Path) -> None:
 @pytest.mark.usefixtures("llvm")
 def test_what_method_and_reference_name_is_looked_at() -> None:
     """Oracle: a name that is there and one that is not; both pages have many."""
-    assert exists("mitsuba_endo.geometry.laws.Law")
-    assert not exists("mitsuba_endo.geometry.laws.Lore")
+    assert exists("mitsuba_endo.geometry.projection_models.ProjectionModel")
+    assert not exists("mitsuba_endo.geometry.projection_models.Lore")
     assert all(len(names_on(DOCS / page)) > 15 for page in ("method.md", "reference.md"))
 
 

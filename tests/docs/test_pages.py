@@ -63,7 +63,7 @@ def _execute(program: str, folder: Path) -> str:
         "refinement.md",
         "video.md",
         "tutorials/scene.md",
-        "tutorials/projector_law.md",
+        "tutorials/projection_model.md",
         "tutorials/dataset.md",
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.endoscope import Endoscope
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.learn.cache import CacheSettings, open_cache
 from mitsuba_endo.learn.scenes import KINDS, random_endoscope, random_surface

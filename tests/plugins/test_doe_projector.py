@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import LAWS, projector_model
+from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, projector_model
 from tests.plugins import scenes
 
 
@@ -41,7 +41,7 @@ def incident(emitter, points: np.ndarray):
     return ds, weight.numpy().T
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_nearest_texel_of_an_integer_coordinate(law: str, llvm: str) -> None:
     """Oracle: I(q) = power T[y, x] / sum(T) |dq / d omega| at pixel centres, row 0 at q_y = 0."""
     pattern = scenes.random_pattern()
@@ -56,7 +56,7 @@ def test_nearest_texel_of_an_integer_coordinate(law: str, llvm: str) -> None:
     np.testing.assert_allclose(ds.dist.numpy(), 7, rtol=1e-5)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_power_is_what_leaves_the_projector(law: str, llvm: str) -> None:
     """Oracle: the integral of radiant intensity over the sphere by uniform sampling."""
     emitter = load(law, pattern=scenes.bitmap(scenes.random_pattern()[..., :1]), power=5.0)
@@ -68,7 +68,7 @@ def test_power_is_what_leaves_the_projector(law: str, llvm: str) -> None:
     assert total == pytest.approx(5.0, rel=0.01)  # Monte Carlo error 0.3 %
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_sampled_rays_agree_with_evaluation(law: str, llvm: str) -> None:
     """Weighted rays and sample_direction are the same light: flux into a cone agrees.
 
@@ -100,7 +100,7 @@ def test_sampled_rays_agree_with_evaluation(law: str, llvm: str) -> None:
     np.testing.assert_allclose(traced, evaluated, rtol=0.02)  # Monte Carlo errors 0.5 %
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_sampled_rays_hit_the_projection_of_their_pixel(law: str, llvm: str) -> None:
     """A pattern with one lit texel sends all its rays through that texel's projection."""
     import mitsuba as mi
@@ -116,7 +116,7 @@ def test_sampled_rays_hit_the_projection_of_their_pixel(law: str, llvm: str) -> 
     np.testing.assert_allclose(weight.numpy(), 2.0, rtol=1e-4)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_nothing_outside_the_pattern_or_behind(law: str, llvm: str) -> None:
     """Oracle: points made outside by more than half a pixel, and behind the projector."""
     emitter = load(law)
@@ -188,7 +188,7 @@ def test_renders_like_mitsubas_projector(llvm: str) -> None:
     assert np.abs(images[0] - images[1]).max() < 1e-5 * images[0].max()
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_variants_agree(law: str, any_variant: str) -> None:
     """Oracle: the formula in NumPy, in a colour, a monochrome and a scalar variant."""
     import drjit as dr
@@ -212,7 +212,7 @@ def test_variants_agree(law: str, any_variant: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*scenes.PROJECTOR, "power"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_derivatives_of_the_light(law: str, name: str, llvm: str) -> None:
     """Oracle: central differences of sample_direction on a linear ramp, for every parameter.
 

@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import LAWS, projector_model
+from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, projector_model
 from tests.plugins import scenes
 
 MODELS = list(scenes.LENSES)
@@ -57,7 +57,7 @@ def check_against(image: np.ndarray, law: str, points: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_plane(law: str, model: str, ad_variant: str) -> None:
     """Oracle: ray-plane intersection and projection in NumPy."""
     mesh, n, d = scenes.tilted_plane()
@@ -74,7 +74,7 @@ def test_plane(law: str, model: str, ad_variant: str) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_sphere(law: str, model: str, ad_variant: str) -> None:
     """Oracle: ray-sphere intersection; a part of the view misses it."""
     centre, radius = np.array([0.8, -0.5, 9.0]), 3.5
@@ -253,7 +253,7 @@ def check_derivative(scene, weights: np.ndarray, set_value, step: float) -> None
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_derivatives_of_intrinsics(law: str, name: str, llvm: str) -> None:
     """Oracle: central finite differences of the rendered image."""
     import mitsuba as mi
@@ -269,7 +269,7 @@ def test_derivatives_of_intrinsics(law: str, name: str, llvm: str) -> None:
 
 @pytest.mark.parametrize("axis", range(6))
 @pytest.mark.parametrize("key", POSES)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_derivatives_of_poses(law: str, key: str, axis: int, llvm: str) -> None:
     """Oracle: central finite differences; rotation about, and translation along, each axis."""
     import mitsuba as mi
@@ -291,7 +291,7 @@ def test_derivatives_of_poses(law: str, key: str, axis: int, llvm: str) -> None:
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1.0), (0.6, -0.3, 0.2)])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_derivatives_of_vertices(law: str, direction: tuple, llvm: str) -> None:
     """Oracle: central finite differences along a random displacement of all vertices."""
     import mitsuba as mi

@@ -18,7 +18,7 @@ from reproduce.tables import (  # pyright: ignore[reportMissingImports]
     spread,
 )
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.shapes.mesh import Mesh
 

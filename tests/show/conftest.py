@@ -9,7 +9,7 @@ import pytest
 from mitsuba_endo import backend
 from mitsuba_endo.evaluate.depth import RayCaster, range_image
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import (
     Calibration,

@@ -11,7 +11,7 @@ from mitsuba_endo.show.measure import SurfacePoint, distance, pick
 from mitsuba_endo.solve.calibrate import calibrate
 from tests.rigs import with_noise
 from tests.solve.monte_carlo import FIELD
-from tests.solve.problems import LAWS, NOISE, map_of, rig_file, small_rig
+from tests.solve.problems import NOISE, PROJECTION_MODELS, map_of, rig_file, small_rig
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_words(calibration: Calibration):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm")
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_interval_covers_the_truth(law: str):
     """Oracle: the truth of a ray-cast sheet whose noise is drawn 24 times; distances between
     points anywhere.

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mitsuba_endo.geometry.laws import ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, tangent_basis
+from mitsuba_endo.initialisation.given_pose import known_start
+from mitsuba_endo.initialisation.result import Start
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.rig import Rig as RigFile
@@ -18,11 +20,9 @@ from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.layout import make_layout
 from mitsuba_endo.solve.unknowns.state import State
-from mitsuba_endo.start.known import known_start
-from mitsuba_endo.start.result import Start
 from tests.rigs import Rig, Surface, bumpy_sheet, cast, lopsided_camera
 
-LAWS = ["pinhole", "direction_cosine"]
+PROJECTION_MODELS = ["pinhole", "direction_cosine"]
 POSE = RigidTransform.of([0.05, -0.09, 0.12], [-6.0, 1.3, 0.7])
 SHEET = bumpy_sheet(70, (0.2, -0.15), 6, 3)
 NOISE = 0.3

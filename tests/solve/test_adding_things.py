@@ -16,14 +16,14 @@ from scipy.spatial.transform import Rotation
 from mitsuba_endo.geometry import laws
 from mitsuba_endo.geometry.arrays import namespace
 from mitsuba_endo.geometry.cameras import CAMERAS, CameraModel, register_camera
-from mitsuba_endo.geometry.laws import LAWS, register_law
+from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, register_projection_model
 from mitsuba_endo.geometry.transforms import rotation_angle
 from mitsuba_endo.records import sharing
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.rendering.coordinates import FrameModel
+from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 from mitsuba_endo.rendering.moving_mesh import vector
-from mitsuba_endo.rendering.untyped import dr, mi
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.costs.problem import make_problem
 from mitsuba_endo.solve.costs.registry import PRIORS, register_prior
@@ -48,7 +48,7 @@ QUICK = Options(jackknife=False)
 
 @pytest.fixture(autouse=True)
 def registries_as_before() -> Iterator[None]:
-    registries: list[Any] = [BLOCKS, MINIMISERS, SURFACES, LAWS, CAMERAS]
+    registries: list[Any] = [BLOCKS, MINIMISERS, SURFACES, PROJECTION_MODELS, CAMERAS]
     further = sharing._FURTHER_BLOCKS
     kept = [dict(r) for r in registries], list(PRIORS), set(further)
     yield
@@ -219,8 +219,8 @@ def test_a_projection_model() -> None:
     """Oracle: the focal length behind a map of an equidistant projector, and the wrong models'
     larger noise."""
 
-    # --- one class with @register_law ---
-    @register_law
+    # --- one class with @register_projection_model ---
+    @register_projection_model
     class Equidistant:
         name: ClassVar[str] = "equidistant"
 

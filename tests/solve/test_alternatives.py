@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
 from mitsuba_endo.records.solution import Solution, load_solution, save_solution
 from mitsuba_endo.solve.calibrate import calibrate

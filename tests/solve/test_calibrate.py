@@ -15,7 +15,7 @@ from mitsuba_endo.records.solution import load_solution, save_solution
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 from tests.rigs import Rig, bumpy_sheet, cast, lopsided_fisheye, sphere, with_noise
-from tests.solve.problems import LAWS, NOISE, POSE, map_of, rig_file, small_rig
+from tests.solve.problems import NOISE, POSE, PROJECTION_MODELS, map_of, rig_file, small_rig
 
 
 def run(rig: Rig, options: Options | None = None, **changes: Any) -> Calibration:
@@ -52,7 +52,7 @@ def check(found: Calibration, rig: Rig, deviations: float = 5) -> None:
 
 
 @pytest.mark.usefixtures("llvm")
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 class TestOneFrame:
     """Oracle: the truth of a ray-cast rig, within five stated standard deviations and 0.3 % of the
     focal length, a milliradian and 2 % of the baseline."""

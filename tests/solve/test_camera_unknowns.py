@@ -14,7 +14,15 @@ from mitsuba_endo.solve.costs.problem import evaluate
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.layout import make_layout
 from tests.rigs import cast, lopsided_fisheye, with_noise
-from tests.solve.problems import LAWS, POSE, SHEET, map_of, problem_of, rig_file, small_rig
+from tests.solve.problems import (
+    POSE,
+    PROJECTION_MODELS,
+    SHEET,
+    map_of,
+    problem_of,
+    rig_file,
+    small_rig,
+)
 
 pytestmark = pytest.mark.usefixtures("llvm")
 ALL = {"camera_focal": "shared", "camera_centre": "shared", "camera_distortion": "shared"}
@@ -28,7 +36,7 @@ def camera_of(rig: Any, wrong: float = 0.0, **changes: Any) -> dict[str, Any]:
     return {**record, "K": K.tolist(), **changes}
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize("fisheye", [False, True])
 def test_derivatives(law: str, fisheye: bool) -> None:
     """Oracle: central differences of the rendered coordinates, pixels that keep their triangle."""

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from mitsuba_endo.initialisation.plane import plane_start
+from mitsuba_endo.initialisation.search import search_start
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.costs.loss import NoiseScale
 from mitsuba_endo.solve.inference.covariance import uncertainty
@@ -11,12 +13,10 @@ from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.minimisers.smoothing import smooth_surfaces
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.start.plane import plane_start
-from mitsuba_endo.start.search import search_start
 from tests.rigs import Rig, with_noise, with_outliers
 from tests.solve.problems import (
-    LAWS,
     NOISE,
+    PROJECTION_MODELS,
     errors,
     problem_of,
     small_rig,
@@ -45,7 +45,7 @@ def within(result: OptimisationResult, rig: Rig, deviations: float) -> None:
 
 
 @pytest.mark.usefixtures("llvm")
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 class TestOptimum:
     @pytest.mark.parametrize("start", ["plane", "search"])
     def test_is_the_truth(self, law: str, start: str):

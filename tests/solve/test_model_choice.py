@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import LAWS
+from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Outcome
@@ -69,7 +69,8 @@ def test_data_that_cannot_tell() -> None:
 
 def fits(views: Views) -> list[Fit]:
     jobs = [
-        Job(views.maps, views.camera, views.rig(), law, Options(jackknife=False)) for law in LAWS
+        Job(views.maps, views.camera, views.rig(), law, Options(jackknife=False))
+        for law in PROJECTION_MODELS
     ]
     return solve_each(jobs, lambda _share, _step: None)
 
@@ -95,7 +96,7 @@ def test_interrupt_in_the_second_try_keeps_the_first(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("mitsuba_endo.solve.calibrate.optimise_again", interrupted)
     (fit,) = fits(narrow_and_noisy())
     assert fit.result.outcome is Outcome.INTERRUPTED
-    assert fit.law == next(iter(LAWS))
+    assert fit.law == next(iter(PROJECTION_MODELS))
     assert fit.result.evaluation is found[0].result.evaluation
     assert fit.result.cost == found[0].result.cost
 

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Projector, Rig, Scale, Share
 from mitsuba_endo.records.solution import Solution

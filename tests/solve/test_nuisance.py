@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.solve import pipeline

@@ -11,7 +11,7 @@ from mitsuba_endo.solve.costs.loss import NoiseScale
 from mitsuba_endo.solve.costs.problem import Evaluation, Problem, evaluate, gradient
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import with_noise, with_outliers
-from tests.solve.problems import LAWS, problem_of, small_rig
+from tests.solve.problems import PROJECTION_MODELS, problem_of, small_rig
 from tests.solve.test_normal import problem as two_frames
 
 RIG = with_outliers(with_noise(small_rig("pinhole"), 0.3, 0), 0.05, 1)
@@ -75,7 +75,7 @@ class TestGradient:
         ]
         return (ends[0] - ends[1]) / 2e-6
 
-    @pytest.mark.parametrize("law", LAWS)
+    @pytest.mark.parametrize("law", PROJECTION_MODELS)
     def test_of_one_frame(self, law: str, last: bool):
         """Oracle: central differences of the cost; the normal equations' right-hand side."""
         rig = with_outliers(with_noise(small_rig(law), 0.3, 0), 0.05, 1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.backend import use
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.correspondence import load_map

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.distortion import BrownDistortion
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.solve.costs.renderer import FrameRenderer, SurfaceScene
@@ -17,7 +17,7 @@ from mitsuba_endo.solve.unknowns.gauge import Gauge
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import Surface, lopsided_camera, lopsided_fisheye, plane, sphere
-from tests.solve.problems import LAWS, POSE, SHEET, rig_file, small_rig
+from tests.solve.problems import POSE, PROJECTION_MODELS, SHEET, rig_file, small_rig
 
 MOVED = RigidTransform.of([0.06, -0.04, 0.1], [4.0, -3.0, 2.0])
 DISTORTION = (0.05, -0.03, 0.002, -0.001, 0.01)
@@ -63,7 +63,7 @@ def rays_of(renderer: FrameRenderer) -> np.ndarray:
 
 
 @pytest.mark.usefixtures("llvm")
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 class TestRendering:
     @pytest.mark.parametrize("moved", [False, True])
     def test_plane(self, law: str, moved: bool):
@@ -110,7 +110,7 @@ class TestRendering:
 
 
 @pytest.mark.usefixtures("llvm")
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize("moved", [False, True])
 class TestJacobian:
     """Oracle: central differences of the rendered coordinates; pixels whose triangle changes in

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.initialisation.given_pose import known_start
+from mitsuba_endo.initialisation.result import Start
 from mitsuba_endo.records.correspondence import load_map
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.frames.restart import with_restarts
@@ -14,8 +16,6 @@ from mitsuba_endo.solve.inference.model_choice import cheaper
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.start.known import known_start
-from mitsuba_endo.start.result import Start
 from scripts.benchmarks.real_captures import CAPTURES, _rig
 from tests.rigs import with_noise
 from tests.solve.problems import map_of, problem_of, small_rig, true_start

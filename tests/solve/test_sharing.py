@@ -12,7 +12,7 @@ from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import make_layout
 from tests.range_scenes import random_relief
 from tests.rigs import with_noise
-from tests.solve.problems import LAWS, map_of, rig_file, small_rig
+from tests.solve.problems import PROJECTION_MODELS, map_of, rig_file, small_rig
 from tests.solve.views import POSE, Views, focal_error, look, projector_poses
 
 pytestmark = pytest.mark.usefixtures("llvm")
@@ -45,7 +45,7 @@ def test_shared_focal_length_is_one_value(unrelated: Views) -> None:
     assert first == pytest.approx(second, abs=min(0.2 * std, 1e-3 * first))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_fixed_focal_length_is_held(law: str) -> None:
     """Oracle: the value given, also where it says that it may be refined; the pose is fitted to it.
 

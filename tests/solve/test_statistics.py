@@ -3,7 +3,7 @@
 import pytest
 
 from tests.solve.monte_carlo import Sample, many_scenes, one_scene
-from tests.solve.problems import LAWS
+from tests.solve.problems import PROJECTION_MODELS
 
 SEEDS = 40
 
@@ -28,7 +28,7 @@ def check(sample: Sample) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("llvm")
 class TestStatistics:
-    @pytest.mark.parametrize("law", LAWS)
+    @pytest.mark.parametrize("law", PROJECTION_MODELS)
     def test_of_one_scene(self, law: str):
         check(one_scene(law, SEEDS))
 

@@ -7,12 +7,12 @@ half a percent, and from a wrong one the way to it is long.
 import numpy as np
 import pytest
 
+from mitsuba_endo.initialisation.given_pose import known_start
+from mitsuba_endo.initialisation.search import search_start
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.start.known import known_start
-from mitsuba_endo.start.search import search_start
 from tests.rigs import Rig, Surface, plane, with_noise
 from tests.solve.problems import map_of, problem_of, rig_file, small_rig
 

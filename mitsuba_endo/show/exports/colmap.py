@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...files import atomic_folder
 from ...folder_mark import Kind
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...reading.regular import is_file
 from ...records.solution import Solution

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...files import atomic_path
 from ...geometry.arrays import Array
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...records.solution import Frame, Solution
 from .registry import register_exporter

@@ -2,7 +2,7 @@
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...records.solution import Frame, PoseEstimate, Solution
 

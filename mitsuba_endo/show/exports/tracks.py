@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...reading.regular import is_file
 from ...records.solution import Frame

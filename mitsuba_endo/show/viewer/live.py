@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.laws import LAWS, projector_model
+from ...geometry.projection_models import PROJECTION_MODELS, projector_model
 from ...records.calibration import Snapshot
 from ...records.rig import Rig
 from ..colours import CAMERA, PROJECTOR
@@ -53,7 +53,7 @@ class LiveView:
     def _frusta(self, snapshot: Snapshot, frame: int) -> None:
         at, projector = snapshot_poses(snapshot, frame), self._rig.projector
         reach = REACH * float(np.median(np.linalg.norm(snapshot.surfaces[0], axis=-1)))
-        law = projector.law if projector.law in LAWS else next(iter(LAWS))
+        law = projector.law if projector.law in PROJECTION_MODELS else next(iter(PROJECTION_MODELS))
         size = projector.width, projector.height
         centre = [(n - 1) / 2 for n in size]
         corners = {

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
-from ...rendering.untyped import dr, mi
+from ...rendering.mitsuba_modules import dr, mi
 from ..elimination.linearisation import Linearisation, whiten
 from ..elimination.normal import NormalEquations
 from ..unknowns.layout import Layout

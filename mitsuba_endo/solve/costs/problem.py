@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
 from ..elimination.linearisation import Linearisation
 from ..elimination.normal import NormalEquations
 from ..surfaces.surface import Surface

@@ -21,8 +21,8 @@ from ...rendering.coordinates import (
     plane_distance,
     project_along,
 )
+from ...rendering.mitsuba_modules import dr, mi
 from ...rendering.moving_mesh import MovingMesh, vector
-from ...rendering.untyped import dr, mi
 from ..elimination.linearisation import Linearisation
 from ..surfaces.surface import Surface
 from ..unknowns.block import BLOCKS

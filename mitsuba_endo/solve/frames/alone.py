@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...geometry.cameras import CameraModel
+from ...initialisation.result import Start
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
 from ...records.solution import Outcome
-from ...start.result import Start
 from ..inference.fit import FrameSolution
 from ..minimisers.minimise import minimise
 from ..minimisers.rendered import render_frames

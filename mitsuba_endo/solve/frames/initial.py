@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
+from ...initialisation.triangulate import smooth_depth
 from ...records.correspondence import CorrespondenceMap
-from ...start.triangulate import smooth_depth
 from ..costs.coordinates import Observations
 from ..surfaces.lattice import Lattice
 

@@ -6,17 +6,17 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel
+from ...geometry.projection_models import ProjectorModel
+from ...initialisation.clean import clean_map
+from ...initialisation.given_pose import known_start, start_at_pose
+from ...initialisation.plane import plane_start
+from ...initialisation.result import Candidate, Start
+from ...initialisation.search import search_start
 from ...records.consistency import fault
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
 from ...records.solution import LeftOut
 from ...sanity.handedness import handedness
-from ...start.clean import clean_map
-from ...start.known import known_start, start_at_pose
-from ...start.plane import plane_start
-from ...start.result import Candidate, Start
-from ...start.search import search_start
 from ..options import Options
 from ..unknowns.layout import Layout
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.transforms import RigidTransform
+from ...initialisation.registration import Registration
 from ...records.rig import Rig
-from ...start.registration import Registration
 from ..costs.problem import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import prior_weight, smoothness

@@ -14,8 +14,8 @@ from ...fusion.clean import areas
 from ...fusion.fuse import vertex_normals
 from ...fusion.remesh import remesh
 from ...geometry.cameras import CameraModel
+from ...initialisation.registration import Registration
 from ...records.rig import Rig
-from ...start.registration import Registration
 from ..costs.problem import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import prior_weight, smoothness

@@ -6,11 +6,11 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import Pinhole
+from ...geometry.projection_models import Pinhole
+from ...initialisation.lens_shift import FrameSamples, LensShift, find_lens_shift, frame_samples
 from ...records.checkpoint import Checkpoint
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
-from ...start.lens_shift import FrameSamples, LensShift, find_lens_shift, frame_samples
 from ..options import Options
 from ..unknowns.layout import Layout
 
@@ -105,8 +105,8 @@ def _assumed(rig: Rig) -> str:
 def _with_centre(rig: Rig, centre: list[float]) -> Rig:
     """Return the rig with a centre that was found, an unknown unless the plan says otherwise.
 
-    One pair determines no more of it than its height (see :mod:`mitsuba_endo.start.lens_shift`):
-    across, the middle is believed to what lenses keep it to.
+    One pair determines no more of it than its height (see :mod:`.lens_shift` of the
+    initialisation): across, the middle is believed to what lenses keep it to.
     """
     share = rig.share.model_copy(update={"centre": rig.share.centre or "shared"})
     width, height = rig.projector.width, rig.projector.height

@@ -6,12 +6,12 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
+from ...initialisation.clean import clean_map, noise_scale
+from ...initialisation.given_pose import known_start
+from ...initialisation.result import Start
+from ...initialisation.rivals import Rival
 from ...records.correspondence import CorrespondenceMap
 from ...records.solution import Outcome
-from ...start.clean import clean_map, noise_scale
-from ...start.known import known_start
-from ...start.result import Start
-from ...start.rivals import Rival
 from ..inference.alternatives import superior
 from ..inference.model_choice import cheaper
 from ..minimisers.result import OptimisationResult

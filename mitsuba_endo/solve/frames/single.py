@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
+from ...initialisation.result import Start
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
-from ...start.result import Start
 from ..costs.coordinates import Observations
 from ..costs.problem import Problem, make_problem
 from ..costs.registry import priors_of

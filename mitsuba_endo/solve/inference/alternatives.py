@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.transforms import RigidTransform, angle_between, rotation_angle
+from ...initialisation.correspondences import Correspondences
+from ...initialisation.rivals import Rival, rivals
 from ...records.solution import Alternative
-from ...start.correspondences import Correspondences
-from ...start.rivals import Rival, rivals
 from ..minimisers.result import USED_WEIGHT, OptimisationResult
 from ..unknowns.layout import Layout
 

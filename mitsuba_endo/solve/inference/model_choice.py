@@ -1,4 +1,4 @@
-"""Which projector law the residuals support, and by how much."""
+"""Which projection model the residuals support, and by how much."""
 
 from typing import Any
 

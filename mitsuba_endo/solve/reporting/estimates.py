@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.transforms import RigidTransform
+from ...initialisation.rivals import Rival
 from ...records.solution import Estimate, Outcome, PoseEstimate, Status
-from ...start.rivals import Rival
 from ..inference.alternatives import AMBIGUOUS, ambiguities
 from ..inference.fit import Fit
 from ..inference.model_error.analysis import with_effect

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
+from ...initialisation.clean import median_filter
 from ...records.correspondence import CorrespondenceMap
-from ...start.clean import median_filter
 
 _SMALL_SHARE = 0.02
 """Change below which two frames are alike: of the image, relative to its width, and of the

@@ -16,8 +16,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from ...rendering.mitsuba_modules import dr, mi
 from ...rendering.moving_mesh import vector
-from ...rendering.untyped import dr, mi
 from .registry import register_surface
 from .surface import Bending, Surface
 

@@ -16,8 +16,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from ...rendering.mitsuba_modules import dr, mi
 from ...rendering.moving_mesh import vector
-from ...rendering.untyped import dr, mi
 from .hinges import hinge_operator
 from .registry import register_surface
 from .surface import Bending, Surface

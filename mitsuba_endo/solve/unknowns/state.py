@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
-from ...geometry.laws import ProjectorModel, projector_model
+from ...geometry.projection_models import ProjectorModel, projector_model
 from ...geometry.transforms import RigidTransform
 from ...rendering.coordinates import FrameModel
 from .block import BLOCKS, Value

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....geometry.cameras import CameraModel
-from ....geometry.laws import ProjectorModel
+from ....geometry.projection_models import ProjectorModel
 from ....geometry.transforms import RigidTransform
-from ....start.epipolar import Bearings, Residuals, bearings, pose_jacobian, residuals
+from ....initialisation.epipolar import Bearings, Residuals, bearings, pose_jacobian, residuals
 from ...costs.coordinates import Observations
 from ...costs.problem import Problem
 from ...unknowns.block import BLOCKS, PoseBlock

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ....geometry.laws import LAWS
+from ....geometry.projection_models import PROJECTION_MODELS
 from ....geometry.transforms import RigidTransform
+from ....initialisation.correspondences import Correspondences
+from ....initialisation.propose import propose
 from ....records.rig import Rig
-from ....start.correspondences import Correspondences
-from ....start.propose import propose
 from ...costs.coordinates import Observations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
@@ -127,7 +127,7 @@ def ways(layout: Layout, rig: Rig, law: str) -> list[Way]:
         Way(name, law, [(name, axis) for axis in np.eye(len(wide.names[name]))])
         for name in WHOLE if name in given
     ]  # fmt: skip
-    out += [Way(f"law.{other}", other) for other in LAWS if other != law]
+    out += [Way(f"law.{other}", other) for other in PROJECTION_MODELS if other != law]
     return out + [Way(f"{PLAN}{name}", law, (), plan) for name, plan in alternatives(layout, rig)]
 
 

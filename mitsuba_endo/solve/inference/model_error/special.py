@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ....geometry.laws import LAWS
+from ....geometry.projection_models import PROJECTION_MODELS
 from ...costs.renderer import FrameRenderer
 from ...minimisers.result import OptimisationResult
 
@@ -89,4 +89,4 @@ class RadialGain:
 
 def specials_of(law: str) -> Sequence[Special]:
     """Return the further columns for a fit under a law."""
-    return [*(OtherLaw(name) for name in LAWS if name != law), RadialGain()]
+    return [*(OtherLaw(name) for name in PROJECTION_MODELS if name != law), RadialGain()]

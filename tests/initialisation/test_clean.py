@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from mitsuba_endo.start.clean import clean_map, fill_nearest, median_filter, noise_scale
+from mitsuba_endo.initialisation.clean import clean_map, fill_nearest, median_filter, noise_scale
 from tests.rigs import random_rig, with_noise, with_outliers, with_slips
 
 

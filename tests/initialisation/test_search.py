@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rotation_angle
-from mitsuba_endo.start.search import search_start
+from mitsuba_endo.initialisation.search import search_start
+from tests.initialisation.success import NOISE, errors, succeeds
 from tests.rigs import (
     Rig,
     bumpy_sheet,
@@ -18,11 +19,10 @@ from tests.rigs import (
     with_outliers,
     with_slips,
 )
-from tests.start.success import NOISE, errors, succeeds
 
 SIZE = (512, 400)
 POSE = RigidTransform.of([0.05, -0.12, 0.03], [-6.2, 0.8, 0.9])
-LAWS = ("pinhole", "direction_cosine")
+PROJECTION_MODELS = ("pinhole", "direction_cosine")
 
 
 def _rig(law, surface=None, pose=POSE) -> Rig:
@@ -60,7 +60,7 @@ def test_finds_99_of_100_random_rigs():
     assert sum(succeeds(seed) for seed in range(100)) >= 99
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_survives_30_percent_outliers(law, seed):
     """Oracle: the truth to 0.3 % in focal length and 0.5 degrees in direction."""
@@ -72,7 +72,7 @@ def test_survives_30_percent_outliers(law, seed):
     assert start.scale_px == pytest.approx(NOISE, rel=0.05)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_survives_10_percent_period_slips(law, seed):
     """Oracle: the truth to 0.3 % and 0.5 degrees, and which pixels slipped by 16 px."""

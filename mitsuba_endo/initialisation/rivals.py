@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 from .choose import (

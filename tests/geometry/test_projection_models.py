@@ -1,10 +1,14 @@
-"""Projector laws: inverses, distortion, known figures, and agreement of NumPy with Dr.Jit."""
+"""Projection models: inverses, distortion, known figures, and agreement of NumPy with Dr.Jit."""
 
 import cv2
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import LAWS, ProjectorModel, projector_model
+from mitsuba_endo.geometry.projection_models import (
+    PROJECTION_MODELS,
+    ProjectorModel,
+    projector_model,
+)
 
 DISTORTION = (-0.12, 0.03, 1e-3, -2e-3, 0.004)
 WIDTH, HEIGHT = 640, 400
@@ -18,7 +22,7 @@ def scattered_q() -> np.ndarray:
     return np.random.default_rng(2).uniform([0, 0], [WIDTH, HEIGHT], (300, 2))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize("distortion", [(), DISTORTION[:2], DISTORTION])
 def test_unproject_is_the_inverse_of_project(law: str, distortion: tuple[float, ...]) -> None:
     """Oracle: the identity, for directions scaled to any length."""
@@ -54,7 +58,7 @@ def test_evanescent_orders_and_points_behind_are_missing() -> None:
     assert np.isnan(model.project(np.array([1.0, 2.0, -5.0]))).all()
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_density_is_pattern_area_per_solid_angle(law: str) -> None:
     """Oracle: determinant of central differences of the projection along two tangents."""
     model = projector(law)
@@ -70,7 +74,7 @@ def test_density_is_pattern_area_per_solid_angle(law: str) -> None:
     np.testing.assert_allclose(model.density_xyz(*d.T), expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_drjit_agrees_with_numpy(law: str, llvm: str) -> None:
     """Oracle: the NumPy evaluation, in double precision on both sides."""
     import drjit as dr
@@ -86,7 +90,7 @@ def test_drjit_agrees_with_numpy(law: str, llvm: str) -> None:
     assert dr.width(back[0]) == len(q)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 @pytest.mark.parametrize(
     "name", ["u", "v", "focal", "cx", "cy", "aspect", "k1", "k2", "p1", "p2", "k3"]
 )

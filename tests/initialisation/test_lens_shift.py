@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.start.lens_shift import LensShift, find_lens_shift, frame_samples
+from mitsuba_endo.initialisation.lens_shift import LensShift, find_lens_shift, frame_samples
 from tests import rigs
 
 SIZE = (512, 400)

@@ -1,4 +1,4 @@
-"""Epipolar residual of a camera-projector pair for any projector law.
+"""Epipolar residual of a camera-projector pair for any projection model.
 
 A correspondence is a unit camera ray d and a pattern coordinate q with bearing b(q) in the
 projector frame. With Y = lambda R d + t the three vectors b, t and R d are coplanar:
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.distortion import BrownDistortion
-from mitsuba_endo.geometry.laws import LAWS, ProjectorModel
+from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform, tangent_basis
 
 from .vectors import Vectors, cross, dot, skew
@@ -73,7 +73,7 @@ def bearings(projector: ProjectorModel, q: Vectors, near: Bearings | None = None
         near: bearings of the same q at another focal length, which save most of the work of
             inverting the distortion.
     """
-    law, distortion = LAWS[projector.law], projector.distortion
+    law, distortion = PROJECTION_MODELS[projector.law], projector.distortion
     fx, fy = projector.focal, projector.focal * projector.aspect
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         x, y = _undistorted(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 from .choose import robust_scale

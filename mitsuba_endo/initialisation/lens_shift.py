@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 
 from .choose import MIN_SCALE_PX, REDESCENDING, RefinementProblem, refine, robust_scale
 from .clean import clean_map, noise_scale

@@ -1,8 +1,8 @@
-"""Projector laws: how a direction leaving the projector becomes a pattern coordinate.
+"""Projection models: how a direction leaving the projector becomes a pattern coordinate.
 
 A law maps the direction Y = R X + t to normalised pattern coordinates (a, b); the projector then
 distorts, scales and shifts them: q = centre + focal (a', aspect b'). Adding a law is one class
-with ``@register_law`` and nothing else.
+with ``@register_projection_model`` and nothing else.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from .arrays import Array, namespace
 from .distortion import BrownDistortion
 
 
-class Law(Protocol):
-    """What a projector law provides; formulas run on NumPy and Dr.Jit components alike."""
+class ProjectionModel(Protocol):
+    """What a projection model provides; formulas run on NumPy and Dr.Jit components alike."""
 
     name: ClassVar[str]
 
@@ -34,16 +34,16 @@ class Law(Protocol):
         ...
 
 
-LAWS: dict[str, Law] = {}
+PROJECTION_MODELS: dict[str, ProjectionModel] = {}
 
 
-def register_law(cls: type) -> type:
+def register_projection_model(cls: type) -> type:
     """Class decorator that makes a law available under its ``name``."""
-    LAWS[cls.name] = cls()
+    PROJECTION_MODELS[cls.name] = cls()
     return cls
 
 
-@register_law
+@register_projection_model
 class Pinhole:
     """(a, b) = (Yx, Yy) / Yz: a lens, or a DOE whose design pre-compensates its distortion."""
 
@@ -60,7 +60,7 @@ class Pinhole:
         return 1 / (cosine * cosine * cosine)
 
 
-@register_law
+@register_projection_model
 class DirectionCosine:
     """(a, b) = (Yx, Yy) / |Y|: the grating equation, orders equally spaced in direction cosines."""
 
@@ -91,7 +91,7 @@ class ProjectorModel:
     """
 
     law: str
-    """Name in :data:`LAWS`."""
+    """Name in :data:`PROJECTION_MODELS`."""
     focal: Array
     """Pattern pixels."""
     centre: tuple[Array, Array]
@@ -107,7 +107,7 @@ class ProjectorModel:
 
     def project_xyz(self, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
         """Project directions in the projector frame (any length, z > 0) to q, pattern pixels."""
-        a, b = self.distortion.apply(*LAWS[self.law].normalise(x, y, z))
+        a, b = self.distortion.apply(*PROJECTION_MODELS[self.law].normalise(x, y, z))
         return self.centre[0] + self.focal * a, self.centre[1] + self.focal * self.aspect * b
 
     def unproject_uv(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
@@ -117,11 +117,11 @@ class ProjectorModel:
         """
         a = (u - self.centre[0]) / self.focal
         b = (v - self.centre[1]) / (self.focal * self.aspect)
-        return LAWS[self.law].direction(*self.distortion.remove(a, b))
+        return PROJECTION_MODELS[self.law].direction(*self.distortion.remove(a, b))
 
     def density_xyz(self, x: Array, y: Array, z: Array) -> Array:
         """Return |dq / d omega|, pattern pixels per steradian, at directions of any length."""
-        law = LAWS[self.law]
+        law = PROJECTION_MODELS[self.law]
         jxx, jxy, jyy = self.distortion.jacobian(*law.normalise(x, y, z))
         stretch = namespace(jxx).abs(jxx * jyy - jxy * jxy)
         return self.focal * self.focal * self.aspect * stretch * law.density(x, y, z)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.start.plane import plane_start
+from mitsuba_endo.initialisation.plane import plane_start
 from tests.rigs import random_rig
 
 

@@ -7,15 +7,15 @@ some vector n: a matrix of rank one whose columns are parallel to t.
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
-from mitsuba_endo.start.correspondences import gather
-from mitsuba_endo.start.rivals import Rival, rivals
+from mitsuba_endo.initialisation.correspondences import gather
+from mitsuba_endo.initialisation.rivals import Rival, rivals
 from tests.rigs import Surface, bumpy_sheet, cast, lopsided_camera, plane, with_noise
 
 SIZE, CENTRE, FOCAL, NOISE = (512, 400), (250.0, 205.0), 500.0, 0.3
 NORMAL, DISTANCE = (0.3, -0.2, 1.0), 70.0
-LAWS = ["pinhole", "direction_cosine"]
+PROJECTION_MODELS = ["pinhole", "direction_cosine"]
 AHEAD = RigidTransform.of([0.1, -0.05, 0.02], [-1.5, 0.8, 5.5])
 """Along the optical axis: both poses of a plane keep it in front."""
 BESIDE = RigidTransform.of([0.05, -0.12, 0.03], [-6.2, 0.8, 0.9])
@@ -42,7 +42,7 @@ def misfit(rival: RigidTransform, true: RigidTransform) -> float:
     return float(np.linalg.norm(s * a - b) / np.linalg.norm(b))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_other_pose_of_a_plane(law: str) -> None:
     """It explains the true plane, is not the truth, and noise cannot decide."""
     (twin,) = found(law, plane(NORMAL, DISTANCE), AHEAD)
@@ -62,7 +62,7 @@ def test_free_focal_length() -> None:
     assert twin.focal == pytest.approx(FOCAL, rel=0.005)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", PROJECTION_MODELS)
 def test_depth_rejects_the_twin(law: str) -> None:
     """Oracle: with a sideways baseline the other pose puts the plane behind the projector."""
     assert found(law, plane(NORMAL, DISTANCE), BESIDE) == []

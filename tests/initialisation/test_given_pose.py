@@ -8,8 +8,8 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.start.known import known_start, start_at_pose
-from mitsuba_endo.start.result import Start
+from mitsuba_endo.initialisation.given_pose import known_start, start_at_pose
+from mitsuba_endo.initialisation.result import Start
 from tests.rigs import Rig, lopsided_camera, random_rig, with_noise, with_outliers
 
 NOISE = 0.3

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 
 from .choose import Minimum, RefinementProblem, finish, refine, robust_scale
 from .clean import clean_map, noise_scale
@@ -96,7 +96,7 @@ def search_start(
 
 
 def _check_found(minima: list[Minimum], size: tuple[int, int]) -> None:
-    todo = "check camera, projector law and centre, and that the map is in pattern pixels"
+    todo = "check camera, projection model and centre, and that the map is in pattern pixels"
     if not minima:
         raise InputError(
             "no projector pose puts the correspondences in front of camera and projector",

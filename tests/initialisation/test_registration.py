@@ -8,12 +8,17 @@ import pytest
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.start.frame_graph import LOOP, FrameGraph
-from mitsuba_endo.start.pairs import register_pair
-from mitsuba_endo.start.range_image import RangePyramid, make_level, typical_range
-from mitsuba_endo.start.registration import EMPTY, RangeImage, Registration, register_frames
-from mitsuba_endo.start.registration_quality import FLAT
-from mitsuba_endo.start.similarity import Similarities
+from mitsuba_endo.initialisation.frame_graph import LOOP, FrameGraph
+from mitsuba_endo.initialisation.pairs import register_pair
+from mitsuba_endo.initialisation.range_image import RangePyramid, make_level, typical_range
+from mitsuba_endo.initialisation.registration import (
+    EMPTY,
+    RangeImage,
+    Registration,
+    register_frames,
+)
+from mitsuba_endo.initialisation.registration_quality import FLAT
+from mitsuba_endo.initialisation.similarity import Similarities
 from tests.range_scenes import (
     SURFACES,
     Scene,

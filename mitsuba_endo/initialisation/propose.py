@@ -1,7 +1,7 @@
 """Proposals of relative pose and focal length, to be refined: five-point RANSAC and homographies.
 
 Neither knows the focal length, so both run for a ladder of focal lengths, on bearing vectors of
-the projector law. They only propose: the focal length with the most inliers can be off by 80 %.
+the projection model. They only propose: the focal length with the most inliers can be off by 80 %.
 """
 
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mitsuba_endo.geometry.laws import ProjectorModel
+from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rotation_angle
 
 from .correspondences import Correspondences

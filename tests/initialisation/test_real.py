@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.laws import projector_model
+from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import angle_between, rotation_angle
-from mitsuba_endo.start.search import search_start
+from mitsuba_endo.initialisation.search import search_start
 
 CAPTURES = Path(__file__).parents[3] / "shared" / "real" / "kamino"
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.start.correspondences import gather
-from mitsuba_endo.start.refine import evaluate
-from mitsuba_endo.start.triangulate import in_front, ranges, smooth_depth
+from mitsuba_endo.initialisation.correspondences import gather
+from mitsuba_endo.initialisation.refine import evaluate
+from mitsuba_endo.initialisation.triangulate import in_front, ranges, smooth_depth
 from tests.rigs import random_rig, with_noise
 
 

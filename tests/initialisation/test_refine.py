@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import angle_between
-from mitsuba_endo.start.correspondences import gather, spread_sample
-from mitsuba_endo.start.refine import EpipolarLoss, evaluate, focal_deviation, minimise
+from mitsuba_endo.initialisation.correspondences import gather, spread_sample
+from mitsuba_endo.initialisation.refine import EpipolarLoss, evaluate, focal_deviation, minimise
 from tests.rigs import random_rig, with_noise
 
 
