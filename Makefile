@@ -23,16 +23,19 @@ help:
 demo: $(STAMPS)/core
 	$(BIN)/mitsuba-endo demo --out demo-output
 
+# Files stay together: what a file's tests share is made once.
+WORKERS := -n auto --maxprocesses 4 --dist loadfile
+
 test: $(STAMPS)/test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(WORKERS)
 
 test-slow: $(STAMPS)/test
-	$(BIN)/python -m pytest -m "slow or not slow"
+	$(BIN)/python -m pytest $(WORKERS) -m "slow or not slow"
 
 # Imported first, because without them the tests would be skipped.
 test-learn: $(STAMPS)/test $(STAMPS)/learn
 	$(BIN)/python -c "import torch, onnx, onnxscript, onnxruntime, h5py"
-	$(BIN)/python -m pytest -m "slow or not slow" tests/learn tests/dataset/test_reader.py
+	$(BIN)/python -m pytest $(WORKERS) -m "slow or not slow" tests/learn tests/dataset/test_reader.py
 
 SEEDS ?= 100
 

@@ -104,7 +104,8 @@ def find_lens_shift(
     """Find the height of the projector's centre that explains the frames best.
 
     Poses and focal length are searched anew at each of :data:`HEIGHTS`; from the best of these the
-    height descends with everything else following. Frames share the centre alone.
+    height descends with everything else following. Frames share the centre alone. Where the middle
+    leaves no more than the maps' own noise, no other centre can be clearly better, nor is tried.
 
     Args:
         frames: samples of each frame.
@@ -117,12 +118,16 @@ def find_lens_shift(
     width, height = size
     middle = ((width - 1) / 2, (height - 1) / 2)
     tried: dict[float, list[EpipolarState]] = {}
-    for share in HEIGHTS:
+    for share in sorted(HEIGHTS, key=lambda h: abs(h - MIDDLE)):
         moved = projector.with_(centre=(middle[0], share * (height - 1)))
         states = [_best(f, moved, width, refine_focal, focal_guess) for f in frames]
         known = [s for s in states if s is not None]
-        if len(known) == len(frames):
-            tried[share] = known
+        if len(known) < len(frames):
+            continue
+        tried[share] = known
+        scale = _scale(known)
+        if share == MIDDLE and BETTER * scale <= max(f.noise_px for f in frames):
+            return LensShift(middle, False, scale, scale, known)
     if not tried:
         return LensShift(middle, False, np.inf, np.inf, [])
     ranked = sorted(tried, key=lambda v: _scale(tried[v]))
