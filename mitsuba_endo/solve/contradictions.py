@@ -65,7 +65,7 @@ def unused_deviations(rig: Rig, layout: Layout, options: Options) -> list[str]:
         return []
     return [
         f"{field}: has no effect, because {' and '.join(f'share.{b}' for b in blocks)} "
-        f"{'are' if len(blocks) > 1 else 'is'} fixed; use shared, or --check-model"
+        f"{'are' if len(blocks) > 1 else 'is'} fixed; use shared, or leave out --no-check-model"
         for field, blocks in _DEVIATIONS.items()
         if _given(rig, field) and not any(layout.free[b] for b in blocks)
     ]
