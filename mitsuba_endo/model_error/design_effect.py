@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from .structure import usable_weights
 
@@ -39,7 +39,7 @@ class DesignEffect:
     @property
     def significant(self) -> NDArray[np.float64]:
         """(K, 2) values, 1 where white noise could have given as much."""
-        limit = chi2.isf(SIGNIFICANCE, self.blocks) / self.blocks
+        limit = chdtri(self.blocks, SIGNIFICANCE) / self.blocks
         return np.where(self.values > np.maximum(limit, 1)[:, None], self.values, 1.0)
 
     @property
@@ -80,7 +80,7 @@ def _ratio(sums: NDArray[np.float64], squares: NDArray[np.float64]) -> NDArray[n
     square = sums**2
     if len(sums) >= MIN_BLOCKS_TO_CLIP:
         relative = square / np.maximum(squares.mean(0), 1e-300)
-        limit = CLIP**2 * np.median(relative, axis=0) / chi2.median(1)
+        limit = CLIP**2 * np.median(relative, axis=0) / chdtri(1, 0.5)
         square = np.minimum(relative, limit) * squares.mean(0)
     return square.mean(0) / np.maximum(squares.mean(0), 1e-300)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ...geometry.transforms import RigidTransform
 from ..minimisers.result import USED_WEIGHT, OptimisationResult
@@ -134,7 +134,7 @@ def chance(alone: FrameSolution, result: OptimisationResult, frame: int) -> floa
     joint = _in_own_unit(layout, own, result.state, frame)
     moved = layout.difference(own, joint) / scale
     along = np.sqrt(values[known]) * (vectors.T[known] @ moved)
-    return float(chi2.sf(along @ along, max(int(known.sum()), 1)))
+    return float(chdtrc(max(int(known.sum()), 1), along @ along))
 
 
 def _in_own_unit(layout: Layout, own: State, joint: State, frame: int) -> State:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from ....records.rig import Rig
 from ....records.solution import Outcome
@@ -68,7 +68,7 @@ class ModelCheck:
         """The candidates that noise does not explain, the most explaining first."""
         if self.causes.gross:
             return self.causes.candidates[:1]
-        limit = norm.isf(FALSE_ALARMS / 2 / max(len(self.tests.candidates), 1)) * self.understated
+        limit = -ndtri(FALSE_ALARMS / 2 / max(len(self.tests.candidates), 1)) * self.understated
         found = [c for c in self.causes.candidates if c.deviations > limit]
         return found if self._telling else []
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ....errors import InputError
 from ....records.rig import Rig
@@ -41,7 +41,7 @@ def plan_tests(result: OptimisationResult, rig: Rig, noise: float) -> list[PlanT
     out = []
     for name, layout in alternatives(result.problem.layout, rig):
         gain, further = _gain(result, layout)
-        chance = float(chi2.sf(gain / noise, max(further, 1)))
+        chance = float(chdtrc(max(further, 1), max(gain, 0.0) / noise))
         out.append(PlanTest(name, BLOCKS[name].words, "per_frame", gain, chance))
     return sorted(out, key=lambda t: -t.gain)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtri
 
 from ....records.rig import Rig
 from ...minimisers.result import OptimisationResult
@@ -113,7 +113,7 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
             named, score, np.diag(information), W.T, strict=True
         )
     ]  # fmt: skip
-    chance = float(chi2.sf(gain / noise, max(rank, 1)))
+    chance = float(chdtrc(max(rank, 1), max(gain, 0.0) / noise))
     blocks = _blocks(found, information, score, W[extended.solved], structured, noise)
     found.sort(key=lambda c: -c.gain)
     return Tests(found, blocks, before, after, energy, gain, chance, noise)
@@ -174,7 +174,7 @@ def _blocks(
         step, rank = _joint(information[np.ix_(at, at)], score[at])
         gain = float(-score[at] @ step)
         share = min(gain / structured, 1.0)
-        deviations = norm.isf(max(chi2.sf(gain / noise, rank), 1e-300) / 2)
+        deviations = -ndtri(max(chdtrc(rank, max(gain, 0.0) / noise), 1e-300) / 2)
         out.append(ModelCandidate(
             name, BLOCKS[name].words, "", name, float(deviations), 1.0, gain, W[:, at] @ step, share
         ))  # fmt: skip
