@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from mitsuba_endo.geometry import laws
+from mitsuba_endo.geometry import projection_models
 from mitsuba_endo.geometry.arrays import namespace
 from mitsuba_endo.geometry.cameras import CAMERAS, CameraModel, register_camera
 from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, register_projection_model
@@ -242,7 +242,7 @@ def test_a_projection_model() -> None:
             return xp.where(r > 0, xp.atan2(r, z) * length / xp.where(r > 0, r, 1.0), 1.0)
 
     # ---
-    model = laws.projector_model("equidistant", 330.0, (250.0, 205.0))
+    model = projection_models.projector_model("equidistant", 330.0, (250.0, 205.0))
     rig = with_noise(cast(lopsided_camera(96, 80), model, (512, 400), POSE, SHEET), 0.1, 0)
     solution = calibrate([map_of(rig)], rig_file(rig), QUICK).solution
     assert solution.projector.focal.value == pytest.approx(330.0, rel=5e-3)
