@@ -245,7 +245,8 @@ def infer(job: Job, done: Optimised, say: Progress) -> Fit:
     if job.options.check_model:
         say(0.0, "Testing the model")
         with job.timed("model"):
-            model = check_model(result, job.rig)
+            decoded = all(m.correlation_px is not None for m in done.maps)
+            model = check_model(result, job.rig, decoded=decoded)
     say(0.5, "Computing standard deviations")
     with job.timed("surface"):
         reported = smooth_surfaces(result, job.options)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
@@ -27,9 +28,13 @@ LAW = "direction_cosine"
 @cache
 def solved(
     k1: float = 0.0, centre: float = 0.0, law: str = LAW, camera_focal: float = 1.0,
-    lens: bool = True, K_std: bool = False, check: bool = True,
+    lens: bool = True, K_std: bool = False, check: bool = True, alike: float = 0.0,
+    told: bool = False,
 ) -> Solution:  # fmt: skip
-    """Calibrate with the camera's k1 and the projector's centre off by so much, and so on."""
+    """Calibrate with the camera's k1 and the projector's centre off by so much, and so on.
+
+    ``alike``: errors of 0.1 px besides the noise, alike over so many pixels; ``told``: by the map.
+    """
     camera, size = lopsided_camera(128, 96), (512, 400)
     projector = projector_model(LAW, FOCAL, (250.0, 205.0))
     rig = cast(camera, projector, size, POSE, bumpy_sheet(70.0, (0.2, -0.1), 6.0, 4))
@@ -44,7 +49,15 @@ def solved(
         projector=Projector(law=law, width=512, height=400, centre=[250.0 + centre, 205.0]),
         scale=Scale(baseline=rig.baseline),
     )  # fmt: skip
-    map_ = CorrespondenceMap(q=rig.q.astype(np.float32), name="a")
+    q = rig.q
+    if alike:
+        smooth = gaussian_filter(
+            np.random.default_rng(5).standard_normal(q.shape), (alike, alike, 0)
+        )
+        q = q + 0.1 * smooth / smooth.std()
+    map_ = CorrespondenceMap(
+        q=q.astype(np.float32), name="a", correlation_px=alike if told else None
+    )
     return calibrate([map_], given, Options(check_model=check)).solution
 
 
@@ -107,6 +120,26 @@ def test_what_was_given_stays_and_moves_no_estimate(error: dict[str, float]) -> 
     assert checked.camera == plain.camera
     assert checked.projector.centre == plain.projector.centre
     assert checked.projector.centre.status == "fixed"
+
+
+def test_a_decoder_s_errors_accuse_nobody_where_the_map_tells_of_them() -> None:
+    """Oracle: the focal length, to 1 %; a map that says nothing leaves the model suspected."""
+    told, silent = solved(alike=4.0, told=True), solved(alike=4.0)
+    assert not told.model["suspected"]
+    assert told.model["doubted"] == []
+    assert "structure as a decoder's errors have it" in told.verdict[-1]
+    assert silent.model["suspected"]
+    focal = told.projector.focal
+    assert focal_error(told) < 3
+    assert isinstance(focal.std, float)
+    assert isinstance(focal.std_formal, float)
+    assert 1.5 * focal.std_formal < focal.std < 0.01 * FOCAL
+
+
+@pytest.mark.parametrize("error", [{"lens": False}, {"camera_focal": 1.2}])
+def test_a_wrong_model_is_noticed_under_a_decoder_s_errors(error: dict) -> None:
+    """Oracle: the error given; candidates take most of such structure away."""
+    assert solved(alike=4.0, told=True, **error).model["suspected"]
 
 
 def test_a_wrong_distortion_is_named_with_its_value() -> None:

@@ -103,7 +103,10 @@ def fitted() -> tuple[Rig, CorrespondenceMap, OptimisationResult]:
     })  # fmt: skip
     kept: list[OptimisationResult] = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "check_model", lambda r, g: kept.append(r) or check_model(r, g))
+        patch.setattr(
+            pipeline, "check_model",
+            lambda r, g, *, decoded: kept.append(r) or check_model(r, g, decoded=decoded),
+        )  # fmt: skip
         calibrate([map_], rig)
     return rig, map_, kept[0]
 

@@ -41,9 +41,14 @@ def model_section(fit: Fit) -> dict[str, Any]:
 
 def conclusion(check: ModelCheck) -> str:
     """Say in a sentence or three whether the model explains the residuals."""
+    structure = check.tests.before.structure
+    if check.of_decoder:
+        return (
+            f"{100 * structure.excess:.0f} % of the residuals is structure as a decoder's errors "
+            "have it, which the intervals count"
+        )
     if not check.wrong:
         return "the residuals look like noise"
-    structure = check.tests.before.structure
     out = [
         f"{100 * structure.excess:.0f} % of the residuals is structure that the model leaves out"
         if structure.excess > 0.005

@@ -36,6 +36,9 @@ _FAR = 0.3
 """The same from which on another projection model is looked for far from the fit."""
 _EXPLAINED = 0.9
 """Share of the residuals' energy that a refit must take away to explain them."""
+_MOST = 0.5
+"""Share of the structure of decoded maps that the candidates must take away to be suspected:
+chosen; on seven photographs, whose rigs were right, they took less."""
 BEYOND = 2.0
 """Factor of a design effect above one: errors alike over the whole image are seen by no block. On
 five real captures, whose effect is 430 to 830, two left the focal length's error at 0.1 to 0.9
@@ -55,6 +58,8 @@ class ModelCheck:
     """What may be wrong, the most likely first."""
     nuisance: Nuisance | None = None
     """What is not known of the given values; None where they count as exact."""
+    decoded: bool = False
+    """Whether the maps say that their errors are alike over some pixels, as a decoder's are."""
     understated: float = 1.0
     """Noise over that of the residuals, which are smaller as the surface follows them."""
 
@@ -74,10 +79,21 @@ class ModelCheck:
 
     @property
     def _telling(self) -> bool:
-        """Whether there is structure, or some that all candidates together take away."""
+        """Whether there is structure, or some that all candidates together take away.
+
+        Structure is no wonder where a decoder's errors are: there the candidates must take most of
+        it away.
+        """
         before, after = self.tests.before.structure, self.tests.after.structure
-        falls = (before.ratio - after.ratio) / before.white_std
-        return _structured(self.tests.before) or falls > _FALLS
+        falls = (before.ratio - after.ratio) / before.white_std > _FALLS
+        if self.decoded:
+            return falls and before.excess - after.excess > _MOST * before.excess
+        return _structured(self.tests.before) or falls
+
+    @property
+    def of_decoder(self) -> bool:
+        """Whether there is structure that is put down to a decoder."""
+        return self.decoded and not self.wrong and _structured(self.tests.before)
 
     @property
     def refuted_plan(self) -> list[PlanTest]:
@@ -100,8 +116,15 @@ class ModelCheck:
         return self.nuisance.covariance + _spread([*shifts, self.nuisance.shift])
 
 
-def check_model(result: OptimisationResult, rig: Rig) -> ModelCheck | None:
+def check_model(
+    result: OptimisationResult, rig: Rig, *, decoded: bool = False
+) -> ModelCheck | None:
     """Test the model of a fit, which stays as it is.
+
+    Args:
+        result: the fit.
+        rig: from which it was made.
+        decoded: whether the maps' errors are said to be alike over some pixels.
 
     Returns:
         What was found; None where the fit was interrupted, and nothing can be said.
@@ -112,7 +135,8 @@ def check_model(result: OptimisationResult, rig: Rig) -> ModelCheck | None:
     extended = extend(result, rig, specials_of(result.problem.law))
     tests = score_tests(extended, rig, variance)
     plan = plan_tests(result, rig, variance * tests.after.effect.largest)
-    check = ModelCheck(tests, plan, _beyond(tests.before.effect.largest), named(tests, []))
+    effect = _beyond(tests.before.effect.largest)
+    check = ModelCheck(tests, plan, effect, named(tests, []), decoded=decoded)
     return _doubting(check, extended, rig, variance)
 
 
