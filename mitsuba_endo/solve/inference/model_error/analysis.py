@@ -38,7 +38,7 @@ _EXPLAINED = 0.9
 """Share of the residuals' energy that a refit must take away to explain them."""
 _MOST = 0.5
 """Share of the structure of decoded maps that the candidates must take away to be suspected:
-chosen; on seven photographs, whose rigs were right, they took less."""
+chosen; on twelve photographs, whose rigs were right, they took less."""
 BEYOND = 2.0
 """Factor of a design effect above one: errors alike over the whole image are seen by no block. On
 five real captures, whose effect is 430 to 830, two left the focal length's error at 0.1 to 0.9
