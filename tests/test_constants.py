@@ -7,20 +7,6 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "mitsuba_endo"
-BEING_SET_ANEW = {
-    ("model_error/design_effect.py", "SHORTEST_PX"),
-    ("model_error/design_effect.py", "MIN_BLOCKS_TO_CLIP"),
-    ("model_error/structure.py", "_TRUNCATE"),
-    ("sequence/epipolar_focal.py", "ROUNDS"),
-    ("sequence/frames.py", "LEAST_CORRESPONDENCES"),
-    ("sequence/gate.py", "LEAST_AGREEMENT"),
-    ("sequence/gate.py", "LARGEST_MISFIT"),
-    ("solve/inference/model_error/refits.py", "_TRIES"),
-    ("solve/inference/model_error/score_tests.py", "_SEVERAL"),
-}
-"""These rooms are being rewritten, and their thresholds with them. None may be added."""
-OWN_FACTOR = {"outcome.py", "placement.py", "refits.py"}
-"""Files there that have a robust deviation of their own, for now."""
 
 
 def unexplained(source: str) -> list[str]:
@@ -66,7 +52,7 @@ def test_every_constant_is_explained() -> None:
         for path in PACKAGE.rglob("*.py")
         for name in unexplained(path.read_text("utf-8"))
     }
-    assert found <= BEING_SET_ANEW
+    assert not found
 
 
 def test_a_bare_constant_is_found() -> None:
@@ -87,5 +73,5 @@ def test_factors_of_statistics_and_angles_have_one_home() -> None:
     ]
     factor = re.compile(r"1\.482\d|0\.674\d|180(\.0)? ?/ ?(np|math)\.pi|(np|math)\.pi ?/ ?180")
     hits = [p.name for p in paths for _ in factor.finditer(p.read_text("utf-8"))]
-    assert set(hits) - OWN_FACTOR == {"robust.py"}
+    assert set(hits) == {"robust.py"}
     assert hits.count("robust.py") == 1

@@ -196,15 +196,10 @@ def _load_maps(paths: list[Path]) -> list["CorrespondenceMap"]:
     """Read maps, calling files of one name in several folders by folder and name."""
     from dataclasses import replace
 
-    from ..records.correspondence import load_map
+    from ..records.correspondence import frame_names, load_map
 
-    names = [path.name for path in paths]
-    return [
-        replace(map_, name=f"{path.absolute().parent.name}/{path.name}")
-        if names.count(path.name) > 1
-        else map_
-        for path, map_ in ((path, load_map(path)) for path in paths)
-    ]
+    names = frame_names(paths)
+    return [replace(load_map(path), name=name) for path, name in zip(paths, names, strict=True)]
 
 
 def with_sharing(rig: "Rig", text: str) -> "Rig":

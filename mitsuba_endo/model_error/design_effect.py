@@ -15,12 +15,14 @@ from scipy.special import chdtri
 from .structure import usable_weights
 
 SHORTEST_PX = 4
+"""Side of the smallest blocks, image pixels. Chosen: larger ones double from here."""
 MIN_FILLED = 0.25
 """Share of a block that must be seen."""
 CLIP = 5.0
 """Robust deviations at which a block's mean is cut off: one patch of slips must not stand for the
 whole image."""
 MIN_BLOCKS_TO_CLIP = 12
+"""Fewer have no robust deviation to be cut off by. Chosen."""
 SIGNIFICANCE = 1e-3
 """Probability with which white noise may be taken for correlated, at each length."""
 

@@ -14,6 +14,7 @@ SMOOTHING_PX = 5.0
 """Standard deviation of the Gaussian: wider than a pixel's neighbourhood that a fitted surface or a
 decoder ties together, narrower than the patterns that wrong intrinsics leave."""
 _TRUNCATE = 4.0
+"""Standard deviations at which the Gaussian ends: 6e-5 of its weight lies beyond."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, shown
-from .correspondence import CorrespondenceMap
+from .correspondence import CorrespondenceMap, check_covariance
 from .rig import Rig
 
 MIN_CORRESPONDENCES = 50
@@ -45,10 +45,8 @@ def _check_arrays(map_: CorrespondenceMap) -> None:
             form = getattr(covariance, "shape", type(covariance).__name__)
             what = f"covariance is {form}, not (H, W, 3) numbers"
             raise InputError(what, f"{map_.name}: map", "mend it")
-        xx, xy, yy = np.moveaxis(covariance[map_.valid & np.isfinite(covariance).all(-1)], -1, 0)
-        if not ((xx > 0) & (yy > 0) & (xy * xy <= xx * yy)).all():
-            what = "covariance is not positive somewhere"
-            raise InputError(what, f"{map_.name}: map", "give variances above zero")
+        known = np.where(map_.valid[..., None], covariance, np.nan)
+        check_covariance(known, q, f"{map_.name}: map")
     if weight is None:
         return
     if not _is_numbers(weight) or weight.shape != q.shape[:2]:

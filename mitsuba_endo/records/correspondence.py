@@ -1,5 +1,7 @@
 """Correspondence maps: for each camera pixel the projector coordinate it sees."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,7 +68,7 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     q, weight, covariance = read.q, read.weight, read.covariance
     known = np.asarray(np.isfinite(q).all(-1))
     if covariance is not None:
-        _check_covariance(covariance, q, str(path))
+        check_covariance(covariance, q, str(path))
         known &= np.isfinite(covariance).all(-1)
         weight = relative_weight(covariance) if weight is None else weight
     if weight is not None:
@@ -76,6 +78,15 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     q = np.where(known[..., None], q, np.float32(np.nan))
     _check(q, str(path))
     return CorrespondenceMap(q, path.name, weight, covariance, read.correlation_px)
+
+
+def frame_names(paths: Sequence[Path]) -> list[str]:
+    """Return what frames of map files are called: files of one name by their folders too."""
+    count = Counter(path.name for path in paths)
+    return [
+        f"{path.absolute().parent.name}/{path.name}" if count[path.name] > 1 else path.name
+        for path in paths
+    ]
 
 
 def relative_weight(covariance: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -230,7 +241,14 @@ def _read_npz(path: Path) -> _Read:
         return _Read(q.astype(np.float32), weight, covariance, correlation)
 
 
-def _check_covariance(covariance: NDArray[np.float32], q: NDArray[np.float32], source: str) -> None:
+def check_covariance(
+    covariance: NDArray[np.floating], q: NDArray[np.floating], source: str
+) -> None:
+    """Refuse covariances (H, W, 3) of a map (H, W, 2) that are none; NaN is passed over.
+
+    Raises:
+        InputError: another shape, or a covariance that is not positive; names ``source``.
+    """
     if covariance.shape != (*q.shape[:2], 3):
         raise InputError(
             f"covariance has shape {covariance.shape} and the map {q.shape[:2]}", source,

@@ -20,6 +20,7 @@ from .view import SAMPLES, ThinnedMap
 Floats = NDArray[np.float64]
 
 ROUNDS = 4
+"""Gauss-Newton steps of a fit: it begins near, from the frame before. Chosen."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from .view import ThinnedMap
 LEAST_SHARE = 0.02
 """Of the pixels: a frame with fewer correspondences shows too little to be placed."""
 LEAST_CORRESPONDENCES = 200
+"""Of a thinned frame, for twelve unknowns. Chosen."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,9 @@ from .placement import Placement
 LEAST_OVERLAP = 0.3
 """Share of the correspondences where the map is known."""
 LEAST_AGREEMENT = 0.8
+"""Share of these within three deviations of the map, between right and wrong placements."""
 LARGEST_MISFIT = 2.2
+"""Spread of their distances over that of noise, likewise."""
 LEAST_ON_LINES = 0.7
 """Share of the correspondences near their epipolar lines."""
 

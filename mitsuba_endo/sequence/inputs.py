@@ -1,6 +1,5 @@
 """Frames of a sequence from files, one at a time: maps, images, folders of either, videos."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -10,7 +9,7 @@ from ..decoding.image_files import ImageFrame, images_of, is_images, read_frames
 from ..errors import InputError
 from ..reading.regular import MAP, regular
 from ..records.correspondence import SUFFIXES as MAPS
-from ..records.correspondence import load_map
+from ..records.correspondence import frame_names, load_map
 from ..records.rig import Rig
 from ..refine.image_decoder import ImageDecoder
 from .frames import Incoming, Unread
@@ -85,10 +84,7 @@ def _inside(path: Path) -> list[Path]:
 
 
 def _loaded(files: Sequence[Path]) -> Iterator[Incoming]:
-    names = Counter(file.name for file in files)
-    for file in files:
-        repeated = names[file.name] > 1
-        name = f"{file.absolute().parent.name}/{file.name}" if repeated else file.name
+    for file, name in zip(files, frame_names(files), strict=True):
         try:
             yield replace(load_map(file), name=name)
         except InputError as error:

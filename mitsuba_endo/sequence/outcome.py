@@ -1,6 +1,5 @@
 """What a sequence leads to: the surface of each part, and a solution that shows keyframes."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,6 +13,7 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.solution import Estimate, Frame, LeftOut, Outcome, PoseEstimate, Solution
 from ..records.trajectory import FrameRow
+from ..robust import robust_std
 from ..solve.reporting.assemble import versions
 from .bootstrap import Beginning
 from .run import Recorded
@@ -157,7 +157,8 @@ def _calibration(
 def _maps(observed: CorrespondenceMap, rendered: NDArray[np.float32]) -> FrameMaps:
     with np.errstate(invalid="ignore"):
         off = np.linalg.norm(observed.q - rendered, axis=-1)
-        limit = FAR * 1.4826 * np.nanmedian(off) if np.isfinite(off).any() else 0.0
+        known = off[np.isfinite(off)]
+        limit = FAR * robust_std(known) if len(known) else 0.0
         return FrameMaps(observed.name, observed.q, rendered, off <= limit)
 
 
@@ -170,12 +171,3 @@ def _with_fit(frame: Frame, maps: FrameMaps) -> Frame:
         "used": int(used.sum()),
         "outliers": 1 - float(used.sum()) / max(int(valid.sum()), 1),
     })  # fmt: skip
-
-
-def numbered(rows: Sequence[FrameRow]) -> list[tuple[float, RigidTransform, RigidTransform]]:
-    """Return numbers, world_from_camera and world_from_projector of placed frames."""
-    return [
-        (float(row.number), row.world_from_camera, row.world_from_projector)
-        for row in rows
-        if row.world_from_camera is not None and row.world_from_projector is not None
-    ]

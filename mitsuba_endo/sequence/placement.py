@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..fusion import Volume
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
+from ..robust import robust_std
 from ..solve.costs.drift import step_between
 from .linearise import AgainstMap, Poses, Triangulated, against_map, triangulate
 from .view import PixelSample
@@ -126,7 +127,7 @@ def _judged(
     return Placement(
         poses, found, noise, float(near.mean()), float(seen.known.mean()),
         float((off < FAR).mean()) if len(off) else 0.0,
-        1.4826 * float(np.median(off)) if len(off) else np.inf, settled, *known,
+        robust_std(off) if len(off) else np.inf, settled, *known,
     )  # fmt: skip
 
 
@@ -134,7 +135,7 @@ def noise_of(found: Triangulated, otherwise: float) -> float:
     """Return the robust standard deviation of the epipolar residuals, pattern pixels."""
     if not found.good.any():
         return otherwise
-    return max(1.4826 * float(np.median(np.abs(found.across[found.good]))), 1e-3)
+    return max(robust_std(found.across[found.good]), 1e-3)
 
 
 def deviation(found: Triangulated, seen: AgainstMap, noise: float, voxel: float) -> Floats:

@@ -10,9 +10,10 @@ from ..fusion import FusedMesh
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import save_solution
 from ..records.surface import save_surface
-from ..records.trajectory import save_frames, save_tum
-from ..sequence.outcome import SequenceResult, numbered
+from ..records.trajectory import save_frames
+from ..sequence.outcome import SequenceResult
 from .solution_folder import save_rig, write_solution_folder
+from .trajectory_files import FRAMES, save_trajectories
 
 KEYFRAMES = "keyframes"
 """A solution folder, which ``report``, ``view``, ``evaluate`` and ``export`` read."""
@@ -43,10 +44,8 @@ def write_sequence_folder(path: str | Path, result: SequenceResult) -> None:
             suffix = "" if part == result.main else f"_part{part + 1}"
             if surface is not None:
                 save_mesh(folder / f"mesh{suffix}.ply", surface)
-            poses = numbered(result.of_part(part))
-            save_tum(folder / f"trajectory_camera{suffix}.tum", [(n, c) for n, c, _ in poses])
-            save_tum(folder / f"trajectory_projector{suffix}.tum", [(n, p) for n, _, p in poses])
-        save_frames(folder / "frames.csv", result.rows)
+            save_trajectories(folder, result.of_part(part), suffix)
+        save_frames(folder / FRAMES, result.rows)
         solution = result.solution
         if result.keyframes is not None:
             write_solution_folder(folder / KEYFRAMES, result.keyframes, result.rig)

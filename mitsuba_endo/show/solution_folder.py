@@ -20,13 +20,14 @@ from ..records.history import save_history, thinned
 from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
 from ..records.surface import MODES, save_modes, save_surface
+from ..records.trajectory import save_frames
 from . import figures
 from .extras import EXTRAS, check_extras
 from .map_names import SURFACE, map_names, observed_names, own_surface_name
 from .read_folder import save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
-from .trajectory_files import save_trajectories
+from .trajectory_files import FRAMES, frame_rows, save_trajectories
 from .view import view_surface
 
 SCENE = "scene.xml"
@@ -84,7 +85,9 @@ def write_solution_folder(
         for k, surface in calibration.own_surfaces.items():
             save_surface(folder / own_surface_name(k), surface)
         _save_modes(folder, calibration)
-        save_trajectories(folder, solution)
+        rows = frame_rows(solution)
+        save_frames(folder / FRAMES, rows)
+        save_trajectories(folder, rows)
         save_trace(folder / "trace.csv", calibration.trace)
         if calibration.history:
             save_history(folder / HISTORY, thinned(calibration.history))

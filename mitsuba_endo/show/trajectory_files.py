@@ -1,30 +1,33 @@
 """Poses of a solution's frames as a table and as trajectories, for spreadsheets and ``evo``."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..records.solution import Frame, PoseEstimate, Solution
-from ..records.trajectory import FrameRow, save_frames, save_tum
+from ..records.trajectory import FrameRow, save_tum
 
 FRAMES = "frames.csv"
-CAMERA, PROJECTOR = "trajectory_camera.tum", "trajectory_projector.tum"
 
 
-def save_trajectories(folder: Path, solution: Solution) -> None:
-    """Write ``frames.csv`` and both trajectories, times being the frames' numbers from 0.
+def save_trajectories(folder: Path, rows: Sequence[FrameRow], suffix: str = "") -> None:
+    """Write where camera and projector were, times being the frames' numbers from 0.
+
+    Args:
+        folder: of ``trajectory_camera.tum`` and ``trajectory_projector.tum``.
+        rows: of the frames; those without a pose are left out.
+        suffix: before ``.tum`` in the files' names.
 
     Raises:
         InputError: a file cannot be written.
     """
-    rows = frame_rows(solution)
-    save_frames(folder / FRAMES, rows)
     cameras = [(r.number, r.world_from_camera) for r in rows if r.world_from_camera is not None]
     projectors = [
         (r.number, r.world_from_projector) for r in rows if r.world_from_projector is not None
     ]
-    save_tum(folder / CAMERA, cameras)
-    save_tum(folder / PROJECTOR, projectors)
+    save_tum(folder / f"trajectory_camera{suffix}.tum", cameras)
+    save_tum(folder / f"trajectory_projector{suffix}.tum", projectors)
 
 
 def frame_rows(solution: Solution) -> list[FrameRow]:

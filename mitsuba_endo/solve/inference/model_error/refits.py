@@ -16,6 +16,7 @@ from ....geometry.transforms import RigidTransform
 from ....initialisation.correspondences import Correspondences
 from ....initialisation.propose import propose
 from ....records.rig import Rig
+from ....robust import MAD_TO_STD
 from ...costs.coordinates import Observations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
@@ -45,6 +46,7 @@ AS_GOOD = 0.9
 _HEAT, _FINALISTS, _FINAL = 4, 4, 16
 """Iterations of every way, how many of the best go on, and for how many more."""
 _TRIES = 4
+"""Dampings tried for a step before a refit ends where it is. Chosen."""
 _SPREAD, _RANKS, _FEW = (0.8, 1.2, 2.0), 2, 300
 """Focal lengths, in extents of what was seen of the pattern, from which another projection model
 is tried, how many poses each, and how many correspondences propose them."""
@@ -54,8 +56,6 @@ _DAMPING = (1e-4, 10.0, 0.1)
 """First one, and the factors after a failed and a successful step."""
 _CAUCHY = 2.5
 """Scale of the robust loss in noise standard deviations."""
-_MEDIAN = 0.6745
-"""Of the absolute value of a standard normal variable."""
 _FAR = 100.0
 """Deviations that count for a pixel without a residual."""
 
@@ -320,7 +320,7 @@ def _jacobian(sample: _Sample, way: Way, at: _Point) -> Floats:
 
 
 def _noise(r: Floats) -> float:
-    return max(float(np.nanmedian(np.abs(r))) / _MEDIAN, 1e-6)
+    return max(MAD_TO_STD * float(np.nanmedian(np.abs(r))), 1e-6)
 
 
 def _cost(r: Floats, sigma: float) -> float:

@@ -21,6 +21,7 @@ from .residual_images import Correlation, residual_correlation
 Floats = NDArray[np.float64]
 
 _SEVERAL = 2
+"""Candidates from which on a block is tested as a whole too: one alone is its own test."""
 _RANK = 1e-6
 """Eigenvalue of the candidates' correlation below which a direction repeats others."""
 _USEFUL = 20.0
