@@ -29,6 +29,7 @@ from .correspondences import (
 )
 from .propose import distinct, focal_lengths, propose
 from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
+from .result import Start
 
 HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)
 """Centres tried first, of the pattern's height: lens shifts of up to 75 %, upwards or downwards."""
@@ -78,6 +79,14 @@ class LensShift:
     """The calibration of every frame at ``centre``; empty where none is possible."""
 
 
+def is_explained(start: Start) -> bool:
+    """Tell whether a start leaves no more than its map's own noise.
+
+    Then no other centre than its own can be clearly better.
+    """
+    return BETTER * start.scale_px <= start.noise_px
+
+
 def frame_samples(
     q: NDArray[np.floating], camera: CameraModel, rng: np.random.Generator
 ) -> FrameSamples:
@@ -104,8 +113,7 @@ def find_lens_shift(
     """Find the height of the projector's centre that explains the frames best.
 
     Poses and focal length are searched anew at each of :data:`HEIGHTS`; from the best of these the
-    height descends with everything else following. Frames share the centre alone. Where the middle
-    leaves no more than the maps' own noise, no other centre can be clearly better, nor is tried.
+    height descends with everything else following. Frames share the centre alone.
 
     Args:
         frames: samples of each frame.
@@ -118,16 +126,12 @@ def find_lens_shift(
     width, height = size
     middle = ((width - 1) / 2, (height - 1) / 2)
     tried: dict[float, list[EpipolarState]] = {}
-    for share in sorted(HEIGHTS, key=lambda h: abs(h - MIDDLE)):
+    for share in HEIGHTS:
         moved = projector.with_(centre=(middle[0], share * (height - 1)))
         states = [_best(f, moved, width, refine_focal, focal_guess) for f in frames]
         known = [s for s in states if s is not None]
-        if len(known) < len(frames):
-            continue
-        tried[share] = known
-        scale = _scale(known)
-        if share == MIDDLE and BETTER * scale <= max(f.noise_px for f in frames):
-            return LensShift(middle, False, scale, scale, known)
+        if len(known) == len(frames):
+            tried[share] = known
     if not tried:
         return LensShift(middle, False, np.inf, np.inf, [])
     ranked = sorted(tried, key=lambda v: _scale(tried[v]))

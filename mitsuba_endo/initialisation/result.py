@@ -39,6 +39,8 @@ class Start:
     """(H, W) correspondences kept by the cleaning and the robust fit."""
     scale_px: float
     """Robust standard deviation of the epipolar residuals, pattern pixels."""
+    noise_px: float = 0.0
+    """Noise of q as the map itself shows it, pattern pixels; 0 where it was not looked at."""
     notes: list[str] = field(default_factory=list)
     """What the user should know: nearly planar data, a twin pose, a focal length the data do not
     determine."""

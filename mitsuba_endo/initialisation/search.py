@@ -77,7 +77,8 @@ def search_start(
 
     focals, bounds = focal_lengths(projector, size[0], few, refine_focal, focal_guess)
     proposals = distinct(propose(few, projector, focals), CANDIDATES)
-    problem = RefinementProblem(projector, refine_focal, bounds, noise_scale(q, usable))
+    noise = noise_scale(q, usable)
+    problem = RefinementProblem(projector, refine_focal, bounds, noise)
     minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
     minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)
@@ -90,6 +91,7 @@ def search_start(
         depth=seen.depth,
         used=seen.used,
         scale_px=robust_scale(found),
+        noise_px=noise,
         notes=remarks(minima, many, refine_focal),
         alternatives=[m.candidate for m in minima[1:]],
     )

@@ -1,11 +1,12 @@
 """What is to be solved and where its optimisation ended: what the stages hand to each other."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from ..geometry.cameras import CameraModel
+from ..initialisation.result import Start
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
@@ -37,6 +38,8 @@ class Job:
     """How the last optimisation went, likewise."""
     notes: tuple[str, ...] = ()
     """What was assumed before it began."""
+    starts: Mapping[str, Start] = field(default_factory=dict)
+    """Starts, by the frame's name, that need not be searched for again."""
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -70,9 +73,9 @@ def with_centre(job: Job, say: Progress) -> Job:
     say(0.0, "Looking for the projector's centre")
     with job.timed("start"):
         if job.resume is not None:
-            rig, note = resumed_centre(job.resume, job.rig)
+            (rig, note), starts = resumed_centre(job.resume, job.rig), {}
         else:
             sound, _ = without_faults(job.maps, job.rig)
             layout = job.layout(len(job.maps))
-            rig, note = searched_centre(sound, job.camera, job.rig, layout, job.options)
-    return replace(job, rig=rig, notes=(note,))
+            rig, note, starts = searched_centre(sound, job.camera, job.rig, layout, job.options)
+    return replace(job, rig=rig, notes=(note,), starts=starts)

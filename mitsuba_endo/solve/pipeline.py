@@ -145,7 +145,7 @@ def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOu
     sound, faulty = without_faults(job.maps, job.rig)
     unique, repeated = without_repeats(sound)
     maps, starts, failed = usable_starts(
-        unique, job.camera, job.rig, job.layout(len(unique)), job.law, job.options
+        unique, job.camera, job.rig, job.layout(len(unique)), job.law, job.options, job.starts
     )
     return maps, starts, [*faulty, *repeated, *failed]
 

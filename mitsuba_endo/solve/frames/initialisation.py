@@ -1,6 +1,6 @@
 """The starts of all frames: each alone, or one projector pose for all."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -63,8 +63,18 @@ def usable_starts(
     layout: Layout,
     law: str,
     options: Options,
+    known: Mapping[str, Start],
 ) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
     """Start every frame; frames without a start are left out by name.
+
+    Args:
+        maps: of the frames.
+        camera: which saw them.
+        rig: what is known.
+        layout: of the unknowns.
+        law: the projection model.
+        options: how to solve.
+        known: starts of some frames, by name, that need not be searched for again.
 
     Raises:
         InputError: no frame has a start.
@@ -73,7 +83,8 @@ def usable_starts(
     failure: InputError | None = None
     for map_ in maps:
         try:
-            starts.append(start_frame(map_, camera, rig, layout, law, options))
+            start = known.get(map_.name)
+            starts.append(start or start_frame(map_, camera, rig, layout, law, options))
             kept.append(map_)
         except InputError as error:
             failure = error

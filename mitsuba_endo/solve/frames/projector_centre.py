@@ -1,18 +1,28 @@
 """The centre of a projector's lens where nobody gave it, looked for before anything is solved."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
 from ...geometry.projection_models import Pinhole
-from ...initialisation.lens_shift import FrameSamples, LensShift, find_lens_shift, frame_samples
+from ...initialisation.lens_shift import (
+    FrameSamples,
+    LensShift,
+    find_lens_shift,
+    frame_samples,
+    is_explained,
+)
+from ...initialisation.result import Start
 from ...records.checkpoint import Checkpoint
+from ...records.consistency import MIN_CORRESPONDENCES
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
 from ..options import Options
 from ..unknowns.layout import Layout
+from .initialisation import start_frame
 
 MAX_FRAMES = 2
 """Frames that are looked at: each takes some 3 s, and one tells the height to a few pixels."""
@@ -49,11 +59,12 @@ def searched_centre(
     rig: Rig,
     layout: Layout,
     options: Options,
-) -> tuple[Rig, str]:
+) -> tuple[Rig, str, dict[str, Start]]:
     """Look for the height of a projector's centre that was not given.
 
-    Nothing is looked for where the start is not searched for either. What was found is a start, not
-    a measurement: the plan lets it be refined unless it says otherwise.
+    Nothing is looked for where the start is not searched for either, nor where the middle explains
+    the frames to their noise. What was found is a start, not a measurement: the plan lets it be
+    refined unless it says otherwise.
 
     Args:
         maps: of all frames; those with most pixels are looked at.
@@ -63,22 +74,28 @@ def searched_centre(
         options: how to solve.
 
     Returns:
-        The rig, with the centre where one was found, and a sentence that says which is used.
+        The rig, with the centre where one was found; a sentence that says which is used; and the
+        starts that the search came upon, of frames by name, as far as they belong to that centre.
     """
     projector, assumed = rig.projector, _assumed(rig)
     if projector.pose is not None or options.start != "search":
-        return rig, assumed
-    frames = _samples(maps, camera, options.seed)
+        return rig, assumed, {}
+    most = sorted(maps, key=lambda m: -int(m.valid.sum()))
+    looked_at = [m for m in most if m.valid.sum() >= MIN_CORRESPONDENCES][:MAX_FRAMES]
+    starts = _starts(looked_at, camera, rig, layout, options)
+    if len(starts) == len(looked_at) and all(is_explained(s) for s in starts.values()):
+        return rig, assumed, starts
+    frames = _samples(looked_at, camera, options.seed)
     if not frames:
-        return rig, assumed
+        return rig, assumed, starts
     shift = find_lens_shift(
         frames, projector.to_model(Pinhole.name), (projector.width, projector.height),
         refine_focal=layout.free["focal"], focal_guess=projector.focal.value,
     )  # fmt: skip
     if not shift.found:
-        return rig, assumed
+        return rig, assumed, starts
     moved = _with_centre(rig, list(shift.centre))
-    return moved, found_note(shift, refined=moved.share.centre != "fixed")
+    return moved, found_note(shift, refined=moved.share.centre != "fixed"), {}
 
 
 def resumed_centre(checkpoint: Checkpoint, rig: Rig) -> tuple[Rig, str]:
@@ -115,16 +132,27 @@ def _with_centre(rig: Rig, centre: list[float]) -> Rig:
     return rig.model_copy(update={"projector": projector, "share": share})
 
 
+def _starts(
+    maps: Sequence[CorrespondenceMap],
+    camera: CameraModel,
+    rig: Rig,
+    layout: Layout,
+    options: Options,
+) -> dict[str, Start]:
+    """Return the starts, by name, of the frames that have one with the centre in the middle."""
+    starts: dict[str, Start] = {}
+    for map_ in maps:
+        with suppress(InputError):  # told where this frame is started
+            starts[map_.name] = start_frame(map_, camera, rig, layout, Pinhole.name, options)
+    return starts
+
+
 def _samples(
     maps: Sequence[CorrespondenceMap], camera: CameraModel, seed: int
 ) -> list[FrameSamples]:
-    """Return samples of the frames with most pixels among those that can be used at all."""
+    """Return samples of the frames that can be used at all."""
     samples: list[FrameSamples] = []
-    for map_ in sorted(maps, key=lambda m: -int(m.valid.sum())):
-        try:
+    for map_ in maps:
+        with suppress(InputError):  # likewise
             samples.append(frame_samples(map_.q, camera, np.random.default_rng(seed)))
-        except InputError:  # told where this frame's start is searched for
-            continue
-        if len(samples) == MAX_FRAMES:
-            break
     return samples
