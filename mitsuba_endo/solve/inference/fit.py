@@ -71,6 +71,17 @@ class Fit:
     """Coarse states from the start to the end."""
 
     @property
+    def estimate(self) -> State:
+        """``state``, with unknowns and surfaces moved by what errors of given values did to them.
+
+        What is rendered and compared with the maps stays at ``state``, as the given values do.
+        """
+        doubt = None if self.model is None or not self.model.corrects else self.model.nuisance
+        if doubt is None:
+            return self.state
+        return self.problem.retract(self.state, doubt.surface_shifts, doubt.shift)
+
+    @property
     def problem(self) -> Problem:
         return self.reported.problem
 

@@ -34,6 +34,7 @@ def model_section(fit: Fit) -> dict[str, Any]:
             {"block": p.block, "mode": p.mode, "chance": p.chance, "refuted": p in refuted}
             for p in check.plan
         ],
+        "corrected": check.corrects,
         "doubted": [] if check.nuisance is None else list(check.nuisance.blocks),
         "conclusion": conclusion(check),
     }
@@ -59,7 +60,8 @@ def conclusion(check: ModelCheck) -> str:
         accused = [suspicion(c) for c in check.accused[:1]]
         out += accused or ["nothing that was tried explains it: decoder, surface or light may"]
     if check.nuisance is not None and check.nuisance.blocks:
-        out.append("the intervals allow for errors of what was given")
+        what = "values and intervals" if check.corrects else "the intervals"
+        out.append(f"{what} allow for errors of what was given")
     return "; ".join(out)
 
 

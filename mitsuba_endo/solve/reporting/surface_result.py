@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from ...records.calibration import FrameMaps, SurfaceEstimate
 from ..inference.covariance import shared_modes
 from ..inference.fit import Fit
+from ..inference.model_error.analysis import CORRECTION_STD
 from ..minimisers.rendered import Rendering, seen_faces
 
 
@@ -18,7 +19,7 @@ def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) ->
         factor: solution's unit per baseline.
         inflation: multiplies the formal standard deviation.
     """
-    shape, values = fit.problem.surfaces[surface], fit.state.surfaces[surface]
+    shape, values = fit.problem.surfaces[surface], fit.estimate.surfaces[surface]
     faces = shape.faces[seen_faces(fit.reported, surface)]
     kept, flat = np.unique(faces, return_inverse=True)
     moved = factor * shape.slopes(values)[kept]
@@ -40,7 +41,9 @@ def _with_nuisance(
     doubt = None if fit.model is None else fit.model.nuisance
     if doubt is None:
         return std, modes
-    further = doubt.surface_roots[surface]
+    part = CORRECTION_STD if fit.model is not None and fit.model.corrects else 1.0
+    shift = part * doubt.surface_shifts[surface]
+    further = np.column_stack([doubt.surface_roots[surface], shift])
     total = np.sqrt(std**2 + (further**2).sum(1))
     return total, shared_modes(np.concatenate([modes, further], 1))
 

@@ -1,13 +1,11 @@
-"""What errors of the given values do to the estimates: their covariance, not their values.
+"""What errors of the given values do to the estimates.
 
 A fit holds what was given. With unknowns x, given values n and the information A of the data about
 n (made orthogonal to x and to the surfaces), an error d of n moves the estimate of x by S d, with
 S = H_xx^-1 H_xn. Under the prior d ~ N(0, P) the data leave d with the covariance
-Q = (P^-1 + A)^-1 and the mean m = Q u, u being the score; so the mean square error of x is
-
-    C + S (Q + m m^T) S^T
-
-where C is the covariance with n known. Its mean over maps is C + S P S^T (law of total variance).
+Q = (P^-1 + A)^-1 and the mean m = Q u, u being the score; so the best estimate is x + S m with the
+covariance C + S Q S^T, where C is the covariance with n known, and x itself has the mean square
+error C + S (Q + m m^T) S^T. Its mean over maps is C + S P S^T (law of total variance).
 """
 
 from collections.abc import Mapping
@@ -40,6 +38,8 @@ class Nuisance:
     """(G,) S m: by how much the unknowns are off, as far as the data tell."""
     surface_roots: list[Floats]
     """(V, K) of every surface's values: products are the covariances that come of it."""
+    surface_shifts: list[Floats]
+    """(V,) by how much every surface's values are off, likewise."""
 
 
 def doubtful(rig: Rig, layout: Layout, stated: bool) -> dict[str, Floats]:
@@ -78,11 +78,11 @@ def nuisance(
     Q = np.linalg.inv(np.eye(len(u)) + A)
     values, vectors = np.linalg.eigh(Q)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    own = W[extended.solved]
-    whole = W @ np.column_stack([root, Q @ u])
+    own, mean = W[extended.solved], Q @ u
     return Nuisance(
-        tuple(roots), (own @ Q) @ own.T, own @ (Q @ u), [X @ whole for X in extended.responses]
-    )
+        tuple(roots), (own @ Q) @ own.T, own @ mean,
+        [X @ (W @ root) for X in extended.responses], [X @ (W @ mean) for X in extended.responses],
+    )  # fmt: skip
 
 
 def _prior_steps(extended: Extended, roots: Mapping[str, Floats]) -> Floats:
