@@ -57,7 +57,28 @@ def use(*variants: str) -> str:
 def ensure() -> str:
     """Return the active variant, starting Mitsuba with the default ones if none is active."""
     mi = sys.modules.get("mitsuba")
-    return (mi.variant() if mi else None) or use()
+    variant = mi.variant() if mi else None
+    if variant is None:
+        return use()
+    from . import plugins
+
+    plugins.ensure_registered()  # the caller may have chosen the variant without us
+    return variant
+
+
+def ensure_vectorised() -> str:
+    """Return the active variant if it works on arrays, starting Mitsuba if none is active.
+
+    Raises:
+        InputError: a scalar variant is active.
+    """
+    variant = ensure()
+    if variant.startswith("scalar"):
+        raise InputError(
+            f"has the variant {variant} active, which renders no coordinates", "Mitsuba",
+            "call mitsuba_endo.backend.use() first",
+        )  # fmt: skip
+    return variant
 
 
 def ensure_derivatives() -> str:

@@ -24,6 +24,12 @@ def register_all() -> None:
         _register(None, mi.variant())
 
 
+def ensure_registered() -> None:
+    """Register the plugins, unless that has been done."""
+    if not _callback_installed:
+        register_all()
+
+
 def _register(old: str | None, new: str | None) -> None:
     import mitsuba as mi
 

@@ -89,3 +89,25 @@ def test_drjit_imported_too_early_is_explained() -> None:
     )
     assert done.returncode != 0
     assert "before anything imports mitsuba or drjit" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("call", "expected"),
+    [
+        ("render_capture(scene, spp=1)", "has the variant scalar_rgb active, which renders no"),
+        ("backend.ensure_derivatives()", "has the variant scalar_rgb active, which the solver"),
+    ],
+)
+def test_a_variant_chosen_before_the_package(llvm: str, call: str, expected: str) -> None:
+    """Oracle: the plugins are there, so a scene loads; what a scalar variant cannot do is told."""
+    done = run(
+        "import mitsuba as mi; mi.set_variant('scalar_rgb')\n"
+        "from mitsuba_endo import backend\n"
+        "from mitsuba_endo.errors import InputError\n"
+        "from mitsuba_endo.rendering.render import render_capture\n"
+        "from mitsuba_endo.rendering.scene import load_scene\n"
+        "scene = load_scene('sheet', width=64, height=48, fx=53, cx=31, cy=23)\n"
+        f"try: {call}\n"
+        "except InputError as error: print(error)"
+    )
+    assert expected in done.stdout, done.stderr

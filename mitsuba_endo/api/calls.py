@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..decoding.masks import Masks
 from ..records.checkpoint import load_checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.plan import with_plan
@@ -32,6 +33,8 @@ def calibrate(
     rig: RigInput,
     *,
     share: Mapping[str, str] | None = None,
+    map_convention: str = "",
+    mask: str | Path | None = None,
     pattern: str | None = None,
     refine: bool = True,
     resume: str | Path | None = None,
@@ -42,10 +45,12 @@ def calibrate(
 
     Args:
         captures: one frame or several: files of correspondence maps or of images of the coded
-            grid, folders or videos of images, arrays (H, W, 2) of pattern pixels with NaN =
+            grid, folders of either, videos, arrays (H, W, 2) of pattern pixels with NaN =
             missing, or maps' records.
         rig: what is known: a rig file's path, its contents, or its record.
         share: entries of the sharing plan to replace, e.g. ``{"projector_pose": "shared"}``.
+        map_convention: how the maps count and order coordinates, a command's ``--map-convention``.
+        mask: image whose white pixels are used, for all frames, or a folder of one per frame.
         pattern: in the images; default the coded grid.
         refine: whether decoded coordinates are refined on their images.
         resume: folder of an earlier calibration of these frames to go on with.
@@ -59,7 +64,10 @@ def calibrate(
     record = as_rig(rig)
     if share:
         record = with_plan(record, share, "share")
-    maps = as_correspondences(as_frames(captures), record, pattern, refine)
+    maps = as_correspondences(as_frames(captures), record, pattern, refine, map_convention)
+    if mask is not None:
+        masks = Masks.at(Path(mask))
+        maps = [masks.applied(map_) for map_ in maps]
     checkpoint = None if resume is None else load_checkpoint(resume)
     return Result(solve(maps, record, options, progress, checkpoint), record)
 

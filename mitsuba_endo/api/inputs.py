@@ -1,5 +1,6 @@
 """What callers bring, paths, arrays or records, as maps and a rig."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -7,9 +8,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..decoding.frame_files import frame_files
 from ..decoding.image_files import ImageFrame, full_scale, is_images, read_frames
 from ..errors import InputError, NothingDecodedError, shown
-from ..records.correspondence import CorrespondenceMap, load_map
+from ..records.correspondence import CorrespondenceMap, load_maps
+from ..records.map_convention import MapConvention, read_map_convention
 from ..records.rig import Rig, load_rig
 from ..records.validation import validate
 from ..refine.image_decoder import ImageDecoder
@@ -48,7 +51,11 @@ def as_frames(captures: FrameInput | Iterable[FrameInput]) -> list[FrameInput]:
 
 
 def as_correspondences(
-    captures: Iterable[FrameInput], rig: Rig, pattern: str | None, refine: bool
+    captures: Iterable[FrameInput],
+    rig: Rig,
+    pattern: str | None,
+    refine: bool,
+    map_convention: str = "",
 ) -> list[CorrespondenceMap]:
     """Return the maps of frames; images are decoded.
 
@@ -57,31 +64,43 @@ def as_correspondences(
         rig: sizes of image and pattern.
         pattern: in the images, a command's ``--pattern``; None: the coded grid.
         refine: whether decoded coordinates are refined on their images.
+        map_convention: of files and arrays, a command's ``--map-convention``; records are right.
 
     Raises:
-        InputError: a frame that cannot be read or is of another kind, or a pattern where there
-            are no images.
+        InputError: a frame that cannot be read or is of another kind, a pattern where there
+            are no images, or a convention of maps where there are no maps.
         NothingDecodedError: no pattern in any image.
     """
-    maps: list[CorrespondenceMap] = []
-    images: list[Path] = []
-    for k, capture in enumerate(captures):
-        if isinstance(capture, CorrespondenceMap):
-            maps.append(capture)
-        elif isinstance(capture, np.ndarray):
-            maps.append(_map_of(capture, k))
-        elif not isinstance(capture, str | Path):
-            what = f"is {shown(type(capture).__name__)} and no capture"
-            raise InputError(what, f"captures[{k}]", "give a path, an array (H, W, 2) or a map")
-        elif is_images(Path(capture)):
-            images.append(Path(capture))
-        else:
-            maps.append(load_map(capture))
-    if images and maps:
+    frames = [frame for k, capture in enumerate(captures) for frame in _frames(capture, k)]
+    paths = [frame for frame in frames if isinstance(frame, Path)]
+    images = [path for path in paths if is_images(path)]
+    if images and len(images) < len(frames):
         raise InputError("maps and images are given", str(images[0]), "give one kind")
-    if not images and pattern is not None:
+    if images:
+        if map_convention:
+            raise InputError("is for maps, and images are given", "map_convention", "leave it out")
+        return _decoded(images, rig, pattern, refine)
+    if pattern is not None:
         raise InputError("is for images, and maps are given", "pattern", "leave it out")
-    return _decoded(images, rig, pattern, refine) if images else maps
+    convention = read_map_convention(map_convention)
+    size = rig.projector.width, rig.projector.height
+    read = iter(load_maps(paths, convention, size))
+    return [
+        frame if isinstance(frame, CorrespondenceMap)
+        else _map_of(frame, k, convention, size) if isinstance(frame, np.ndarray)
+        else next(read)
+        for k, frame in enumerate(frames)
+    ]  # fmt: skip
+
+
+def _frames(capture: FrameInput, index: int) -> list[Path | Array | CorrespondenceMap]:
+    """Return the frames of a capture: of a folder of maps, each."""
+    if isinstance(capture, CorrespondenceMap | np.ndarray):
+        return [capture]
+    if isinstance(capture, str | Path):
+        return list(frame_files([Path(capture)]))
+    what = f"is {shown(type(capture).__name__)} and no capture"
+    raise InputError(what, f"captures[{index}]", "give a path, an array (H, W, 2) or a map")
 
 
 def decode_frame(decoder: ImageDecoder, frame: ImageFrame) -> CorrespondenceMap:
@@ -109,6 +128,7 @@ def as_image(image: str | Path | Array) -> ImageFrame:
         first = next(frames)
         if next(frames, None) is not None:
             raise InputError("holds several images", str(image), "decode them one by one")
+        tell(first)
         return first
     array = np.asarray(image)
     whole = array.dtype in (np.uint8, np.uint16)
@@ -118,6 +138,12 @@ def as_image(image: str | Path | Array) -> ImageFrame:
     scale = full_scale(array) if whole else 1.0
     scaled = np.divide(array, scale, dtype=np.float32)
     return ImageFrame("image", "image", scaled if scaled.ndim == 3 else scaled[..., None])
+
+
+def tell(frame: ImageFrame) -> None:
+    """Warn of what was done to an image, once for each file."""
+    if frame.note:
+        warnings.warn(frame.note, UserWarning, stacklevel=4)
 
 
 def _decoded(
@@ -132,6 +158,7 @@ def _decoded(
     failure: NothingDecodedError | None = None
     decoder = ImageDecoder(rig, pattern, refine=refine)
     for frame in read_frames(images):
+        tell(frame)
         try:
             maps.append(decode_frame(decoder, frame))
         except NothingDecodedError as error:
@@ -141,8 +168,11 @@ def _decoded(
     return maps
 
 
-def _map_of(array: Array, index: int) -> CorrespondenceMap:
+def _map_of(
+    array: Array, index: int, convention: MapConvention, size: tuple[int, int]
+) -> CorrespondenceMap:
     if array.ndim != 3 or array.shape[2] != 2 or array.dtype.kind not in "uif":
         what = f"is an array {array.shape} of {array.dtype}"
         raise InputError(what, f"captures[{index}]", "give a map (H, W, 2) in pattern pixels")
-    return CorrespondenceMap(np.ascontiguousarray(array, np.float32), f"frame_{index}")
+    q = convention.coordinates(np.ascontiguousarray(array, np.float32), size)
+    return CorrespondenceMap(q, f"frame_{index}")

@@ -9,6 +9,7 @@ import typer
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 from .decode import Refine
 from .live import watching
+from .map_options import MapConvention, Mask
 
 if TYPE_CHECKING:
     from ..records.checkpoint import Checkpoint
@@ -22,7 +23,8 @@ Maps = Annotated[
     list[Path],
     typer.Argument(
         metavar="MAP_OR_IMAGE",
-        help="Correspondence maps, .exr or .npz, one per frame; or images of the coded grid.",
+        help="Correspondence maps, .exr, .npz or .npy, one per frame, or folders of them; or "
+        "images of the coded grid.",
     ),
 ]
 RigFile = Annotated[Path, typer.Option("--rig", help="Rig file: what is known and what is not.")]
@@ -112,6 +114,8 @@ def calibrate(
     start: Start = "search",
     check_model: CheckModel = True,
     share: Share = None,
+    map_convention: MapConvention = "",
+    mask: Mask = None,
     seed: Seed = 0,
     resume: Resume = None,
     pattern: Pattern = None,
@@ -130,6 +134,7 @@ def calibrate(
     from ..litter import scratch_folder
 
     with session(quiet, as_json, debug) as output, scratch_folder() as aside:
+        from ..decoding.frame_files import frame_files
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
         from ..records.checkpoint import load_checkpoint
@@ -137,11 +142,13 @@ def calibrate(
         from .decode import decode_images
 
         extras = _extras(save)
-        prepare_folder(out, Kind.CALIBRATION, [*maps, rig, *([resume] if resume else [])])
+        given = [path for path in (rig, resume, mask) if path]
+        prepare_folder(out, Kind.CALIBRATION, [*maps, *given])
         checkpoint = None if resume is None else load_checkpoint(resume)
-        paths = decode_images(maps, rig, pattern, refine, aside, output)
+        files = frame_files(maps)
+        paths = decode_images(files, rig, pattern, refine, aside, output, map_convention)
         decoded = aside if any(aside.iterdir()) else None
-        frames, rig_record = load_input(paths, rig, share, output.print)
+        frames, rig_record = load_input(paths, rig, share, output.print, map_convention, mask)
         options = Options(
             solver=solver, surface=surface, start=start, check_model=check_model, seed=seed
         )
@@ -171,10 +178,18 @@ def load_input(
     rig_file: Path,
     share: str | None = None,
     log: Callable[[str], None] = lambda note: None,
+    convention: str = "",
+    mask: Path | None = None,
 ) -> tuple[list["CorrespondenceMap"], "Rig"]:
     """Read and check everything that a calibration starts from.
 
-    ``log`` is called with a sentence for each camera file of another program: what was read.
+    Args:
+        paths: of the maps.
+        rig_file: what is known.
+        share: entries of the sharing plan to replace.
+        log: called with a sentence for each camera file of another program: what was read.
+        convention: words on how the maps count, see :mod:`..records.map_convention`.
+        mask: of the pixels to use, an image or a folder.
 
     Raises:
         InputError: a file is missing or wrong, or the maps do not belong to the rig.
@@ -187,19 +202,23 @@ def load_input(
         log(note)
     if share:
         rig = with_sharing(rig, share)
-    maps = _load_maps(paths)
+    maps = _load_maps(paths, rig, convention, mask)
     examine(maps, rig)  # refuses before any work; the solver asks again and keeps the warnings
     return maps, rig
 
 
-def _load_maps(paths: list[Path]) -> list["CorrespondenceMap"]:
-    """Read maps, calling files of one name in several folders by folder and name."""
-    from dataclasses import replace
+def _load_maps(
+    paths: list[Path], rig: "Rig", convention: str, mask: Path | None
+) -> list["CorrespondenceMap"]:
+    """Read maps as their makers meant them, without the pixels that a mask leaves out."""
+    from ..decoding.masks import Masks
+    from ..records.correspondence import load_maps
+    from ..records.map_convention import read_map_convention
 
-    from ..records.correspondence import frame_names, load_map
-
-    names = frame_names(paths)
-    return [replace(load_map(path), name=name) for path, name in zip(paths, names, strict=True)]
+    size = rig.projector.width, rig.projector.height
+    maps = load_maps(paths, read_map_convention(convention), size)
+    masks = Masks.at(mask) if mask else None
+    return [masks.applied(map_) for map_ in maps] if masks else maps
 
 
 def with_sharing(rig: "Rig", text: str) -> "Rig":

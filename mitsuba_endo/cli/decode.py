@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import EXIT_FAULT, Debug, Json, Quiet, Session, session
+from .map_options import Mask
 
 if TYPE_CHECKING:
     from ..decoding.grid.decode import DecodedGrid
@@ -78,6 +79,7 @@ def decode(
     pattern: Pattern = DEFAULT,
     weights: Weights = None,
     refine: Refine = True,
+    mask: Mask = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -94,10 +96,10 @@ def decode(
         from ..outputs import prepare_folder
         from ..records.rig import load_rig
 
-        prepare_folder(out, Kind.MAPS, [*images, rig, *([weights] if weights else [])])
+        prepare_folder(out, Kind.MAPS, [*images, *(path for path in (rig, weights, mask) if path)])
         record = load_rig(rig)
         with atomic_folder(out, Kind.MAPS) as folder:
-            found = decode_into(folder, images, record, pattern, weights, refine, output)
+            found = decode_into(folder, images, record, pattern, weights, refine, output, mask)
             refuse_nothing(found)
         decoded = [one for one in found if not one.reason]
         output.print(*(one.line() for one in found))
@@ -113,6 +115,7 @@ def decode_into(
     weights: Path | None,
     refine: bool,
     output: Session,
+    mask: Path | None = None,
 ) -> list[Summary]:
     """Decode images, write maps and pictures of those with a pattern, and say what was found.
 
@@ -120,17 +123,27 @@ def decode_into(
         InputError: an image that cannot be read or is not of the rig's size, a wrong pattern or
             network.
     """
+    from dataclasses import replace
+
     from ..decoding.image_files import read_frames
+    from ..decoding.masks import Masks
     from ..refine.image_decoder import ImageDecoder
 
     decoder = ImageDecoder(rig, pattern, weights, refine=refine)
-    found = []
+    masks = Masks.at(mask) if mask else None
+    found, notes = [], set()
     with output.progress("Decoding") as advance:
         for frame in read_frames(images):
             advance(0.0, f"Decoding {frame.name}")
+            if frame.note and frame.note not in notes:
+                output.print(f"warning: {frame.note}")
+            notes.add(frame.note)
             decoded = decoder.decode(frame)
-            found.append(_summary(frame.name, decoded.grid, decoded.map))
-            _write(folder, frame, decoded.grid, decoded.map)
+            map_ = decoded.map
+            if masks:
+                map_ = replace(map_, map=masks.applied(map_.map))
+            found.append(_summary(frame.name, decoded.grid, map_))
+            _write(folder, frame, decoded.grid, map_)
     return found
 
 
@@ -149,12 +162,13 @@ def decode_images(
     refine: bool,
     aside: Path,
     output: Session,
+    map_convention: str = "",
 ) -> list[Path]:
     """Return correspondence maps: those given, or those of the images given, written to ``aside``.
 
     Raises:
-        InputError: maps and images at once, a pattern for maps, no pattern found in any image, or
-            as :func:`decode_into`.
+        InputError: maps and images at once, a pattern for maps, a convention of maps for images,
+            no pattern found in any image, or as :func:`decode_into`.
     """
     from ..decoding.image_files import is_images
     from ..errors import InputError
@@ -169,6 +183,8 @@ def decode_images(
         return paths
     if len(images) < len(paths):
         raise InputError("maps and images are given", str(images[0]), "give one kind")
+    if map_convention:
+        raise InputError("is for maps, and images are given", "--map-convention", "leave it out")
     rig = load_rig(rig_file)
     found = decode_into(aside, images, rig, pattern, None, refine, output)
     refuse_nothing(found)

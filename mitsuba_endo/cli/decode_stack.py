@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Advance, Debug, Json, Quiet, Session, session
-from .stack_options import Height, Periods, Steps, Stripe, Width, numbers
+from .map_options import Mask
+from .stack_options import Height, Periods, Steps, Stripe, Width, numbers, pair
 
 if TYPE_CHECKING:
     from ..decoding.stack import DecodedStack
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
 
 Images = Annotated[
     list[Path],
-    typer.Argument(metavar="FOLDER_OR_IMAGES...", help="One folder, or the images in order."),
+    typer.Argument(
+        metavar="FOLDER_OR_IMAGES...",
+        help="One folder, one TIFF file of all images, or the images in order.",
+    ),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Map to write, .exr or .npz.")]
 Kind = Annotated[
@@ -44,6 +48,12 @@ Gamma = Annotated[
         min=0.1, max=5, help="Images hold brightness^(1/gamma): 2.2 for most photographs."
     ),
 ]
+Offset = Annotated[
+    str,
+    typer.Option(
+        metavar="X,Y", help="Where the pattern's first pixel lies in the projector, pixels."
+    ),
+]
 FEW = 0.001
 """Share of the pixels whose fine bits were left out, under which nothing is said of it."""
 
@@ -63,6 +73,8 @@ def decode_stack(
     convention: Convention = "",
     min_contrast: MinContrast = 0.03,
     gamma: Gamma = 1.0,
+    offset: Offset = "0,0",
+    mask: Mask = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -73,12 +85,16 @@ def decode_stack(
     they are not stated, and said. Names as the command patterns gives them state all of it.
     """
     with session(quiet, as_json, debug) as output:
+        import numpy as np
+
         from ..decoding.conventions import read_convention
+        from ..decoding.masks import Masks
         from ..decoding.stack import decode_stack as decode
         from ..decoding.stack_files import StackFiles, stack_paths
         from ..decoding.stack_reading import StackRequest, find_reading, read_by_names
         from ..outputs import prepare_file
-        from ..records.correspondence import WEIGHT, check_map_path, save_map
+        from ..records.correspondence import CorrespondenceMap, check_map_path, save_map
+        from ..records.map_arrays import WEIGHT
 
         check_map_path(out)
         request = StackRequest(
@@ -87,7 +103,10 @@ def decode_stack(
             periods=numbers(periods), steps=steps, convention=read_convention(convention),
         )  # fmt: skip
         paths = stack_paths(images)
-        prepare_file(out, paths)
+        prepare_file(out, [*(p if isinstance(p, Path) else p.path for p in paths),
+                           *([mask] if mask else [])])  # fmt: skip
+        masks = Masks.at(mask) if mask else None
+        shift = pair(offset)
         reading = read_by_names(paths, request)
         if reading is None:
             request.plans(len(paths))  # refuses early
@@ -101,8 +120,17 @@ def decode_stack(
                 stack, reading.plan, order=reading.order, min_contrast=min_contrast,
                 advance=partial(_advance, advance, "Decoding"),
             )  # fmt: skip
-        save_map(out, result.q, {WEIGHT: result.weight})
+        _say_notes(output, stack.notes)
+        map_ = CorrespondenceMap(result.q + np.array(shift, np.float32), out.name, result.weight)
+        save_map(out, masks.applied(map_).q if masks else map_.q, {WEIGHT: result.weight})
         _report(output, out, result, reading)
+
+
+def _say_notes(output: Session, notes: list[str]) -> None:
+    """Print what was done to the images: of many alike, the first."""
+    if notes:
+        more = f" ({len(notes)} images alike)" if len(notes) > 1 else ""
+        output.print(f"warning: {notes[0]}{more}")
 
 
 def _advance(advance: Advance, what: str, share: float) -> None:

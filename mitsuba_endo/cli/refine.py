@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import EXIT_FAULT, Debug, Json, Quiet, session
+from .map_options import MapConvention, Mask
 
 if TYPE_CHECKING:
     from ..records.rig import Rig
@@ -36,6 +37,8 @@ def refine(
     out: Out,
     gamma: Gamma = 2.2,
     pattern_gamma: PatternGamma = 1.0,
+    map_convention: MapConvention = "",
+    mask: Mask = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -46,16 +49,24 @@ def refine(
     If the image confirms nothing, the map is written as it was, and the exit code is 1.
     """
     with session(quiet, as_json, debug) as output:
-        from ..decoding.image_files import full_scale, read_image
+        from ..decoding.image_files import full_scale, open_image
+        from ..decoding.masks import Masks
         from ..records.correspondence import check_map_path, load_map, write_map
+        from ..records.map_convention import read_map_convention
         from ..records.rig import load_rig
         from ..refine.options import RefineOptions
         from ..refine.refine_map import refine_map
 
         check_map_path(out)
-        start = load_map(map_file)
-        texture = _pattern(pattern, load_rig(rig), pattern_gamma)
-        raw = read_image(image)
+        record = load_rig(rig)
+        size = record.projector.width, record.projector.height
+        start = load_map(map_file, read_map_convention(map_convention), size)
+        start = Masks.at(mask).applied(start) if mask else start
+        texture = _pattern(pattern, record, pattern_gamma)
+        stored = open_image(image)
+        if stored.note:
+            output.print(f"warning: {stored.note}")
+        raw = stored.pixels
         result = refine_map(start, raw / full_scale(raw), texture, RefineOptions(gamma=gamma))
         write_map(out, result.map)
         output.print(

@@ -58,3 +58,22 @@ def numbers(text: str | None) -> tuple[float, ...] | None:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise InputError(f"'{text}' are not numbers", "--periods", "e.g. 600,96,16") from None
+
+
+def pair(text: str) -> tuple[float, float]:
+    """Return the two numbers of ``X,Y``.
+
+    Raises:
+        InputError: it holds other things.
+    """
+    import math
+
+    from ..errors import InputError
+
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        x, y = math.nan, math.nan
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InputError(f"'{text}' are not two numbers", "--offset", "e.g. 128,64")
+    return x, y

@@ -15,7 +15,8 @@ from ..folder_mark import Kind
 from ..litter import sweep
 from ..reading.trees import read_json
 from ..records.calibration import SurfaceEstimate
-from ..records.correspondence import read_exr, save_map, write_exr
+from ..records.correspondence import save_map
+from ..records.exr_files import read_exr, write_exr
 from ..records.known_input import known_rig, save_rig
 from ..records.solution import save_solution
 from ..records.surface import load_surface, save_surface

@@ -14,7 +14,15 @@ from ..files import atomic_folder
 from ..folder_mark import Kind as FolderKind
 from ..png import write_png
 from ..reading.regular import is_file
-from .image_files import depth_scale, images_of, read_image
+from .image_files import (
+    VIDEOS,
+    ImageSource,
+    depth_scale,
+    images_in,
+    images_of,
+    open_image,
+    read_image,
+)
 from .plan import STRIPES, Kind, StackPlan
 from .stack_images import Stack
 from .stack_patterns import patterns
@@ -39,22 +47,26 @@ def save_patterns(folder: str | Path, plan: StackPlan) -> list[str]:
     return names
 
 
-def stack_paths(given: Sequence[str | Path]) -> list[Path]:
-    """Return the images: those given, or those of the one folder given, by number and name.
+def stack_paths(given: Sequence[str | Path]) -> list[ImageSource]:
+    """Return the images: those given, or those of the one folder or file of pages given.
+
+    Those of a folder come by number and name.
 
     Raises:
         InputError: a file is missing, or the folder holds no image.
     """
     paths = [Path(p) for p in given]
     if len(paths) == 1 and paths[0].is_dir():
-        return images_of(paths[0])
+        return list(images_of(paths[0]))
     for path in paths:
         if not is_file(path):
             raise InputError("no such image", str(path), "give image files or one folder")
-    return paths
+        if path.suffix.lower() in VIDEOS:
+            raise InputError("is a video", str(path), "save an image of each pattern")
+    return list(images_in(paths[0])) if len(paths) == 1 else list(paths)
 
 
-def check_names(paths: Sequence[Path], plan: StackPlan) -> None:
+def check_names(paths: Sequence[ImageSource], plan: StackPlan) -> None:
     """Compare the number of files, and names that end in a label, with the plan.
 
     Raises:
@@ -77,7 +89,7 @@ def check_names(paths: Sequence[Path], plan: StackPlan) -> None:
             )
 
 
-def _label(path: Path) -> str | None:
+def _label(path: ImageSource) -> str | None:
     match = _LABEL.search(path.stem)
     return match.group() if match else None
 
@@ -87,7 +99,7 @@ def _abridged(labels: Sequence[str]) -> str:
     return ", ".join(shown)
 
 
-def labels_of(paths: Sequence[Path]) -> list[str] | None:
+def labels_of(paths: Sequence[ImageSource]) -> list[str] | None:
     """Return the labels that names end in; None unless all do."""
     labels = [_label(path) for path in paths]
     return None if None in labels else [label for label in labels if label]
@@ -147,7 +159,7 @@ class StackFiles:
     """
 
     def __init__(
-        self, paths: Sequence[Path], gamma: float = 1.0, memory: int = MEMORY,
+        self, paths: Sequence[ImageSource], gamma: float = 1.0, memory: int = MEMORY,
         advance: Callable[[float], None] = lambda share: None,
     ) -> None:  # fmt: skip
         """Look at every image once.
@@ -165,8 +177,12 @@ class StackFiles:
         first = read_image(self._paths[0])
         self._band = _Band(0, {})
         brightest, keep = 0, first.nbytes * len(self._paths) <= memory
+        self.notes: list[str] = []
+        """What was done to the images that their reader should know, sentences."""
         for k, path in enumerate(self._paths):
-            raw = read_image(path)
+            stored = open_image(path)
+            raw = stored.pixels
+            self.notes += [stored.note] if stored.note else []
             _check_alike(raw, first, path)
             brightest = max(brightest, int(raw.max()))
             if keep:
@@ -220,7 +236,7 @@ class _Band:
         return self.rows[image][start - self.start : stop - self.start]
 
 
-def _check_alike(raw: NDArray[np.integer], first: NDArray[np.integer], path: Path) -> None:
+def _check_alike(raw: NDArray[np.integer], first: NDArray[np.integer], path: ImageSource) -> None:
     if raw.shape[:2] != first.shape[:2]:
         raise InputError(
             f"is {raw.shape[1]} x {raw.shape[0]} pixels, the first image "

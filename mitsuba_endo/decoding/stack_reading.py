@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 from ..errors import InputError
 from .convention_search import find_convention
 from .conventions import NOTHING, OPTION, Stated, own_convention
+from .image_files import ImageSource
 from .plan import Kind, StackPlan, possible_plans
 from .stack import CONTRAST_OVER_NOISE, MIN_CONTRAST
 from .stack_files import check_names, labelled_plan, labels_of
@@ -75,7 +75,7 @@ class StackReading:
     """What told it."""
 
 
-def read_by_names(paths: Sequence[Path], request: StackRequest) -> StackReading | None:
+def read_by_names(paths: Sequence[ImageSource], request: StackRequest) -> StackReading | None:
     """Return what names tell that end in labels as the command patterns gives them, else None.
 
     Raises:

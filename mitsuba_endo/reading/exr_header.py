@@ -18,6 +18,8 @@ _TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
 """Bits of the version field: tiles, deep data, several parts."""
 _LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)
 """Lines of a chunk by the number of the compression; later ones have at most as many."""
+_LOSSY = (6, 7, 8, 9)
+"""B44, B44A, DWAA, DWAB; PXR24 keeps 16 binary digits of a number."""
 _RATIO = (1, 128, 1032, 1032)
 """How much none, run lengths and deflate (of one line, of 16) shrink at most; others at will."""
 _CHUNK = 16
@@ -36,29 +38,44 @@ class Header:
     channels: int
     sample_bytes: int
     """Bytes of one pixel, all channels."""
+    place: tuple[int, int]
+    """Row and column of the first pixel in the picture that the file shows."""
+    shown: tuple[int, int]
+    """Rows and columns of that picture."""
     compression: int
     tiled: bool
     subsampled: bool
 
+    @property
+    def lossy(self) -> bool:
+        """Whether the compression changes 32-bit numbers by more than rounding."""
+        return self.compression in _LOSSY
 
-def check_exr(path: str | Path) -> Header:
-    """Refuse a file whose header promises more than the file can hold, or memory should.
+    @property
+    def bytes(self) -> int:
+        """Taken in memory, as 32-bit numbers."""
+        rows, columns = self.shown
+        return 4 * max(self.width * self.height, rows * columns) * self.channels
+
+
+def check_exr(path: str | Path) -> tuple[Header, ...]:
+    """Return the headers of a file's parts, refusing what promises more than the file can hold.
 
     Raises:
-        InputError: missing, no OpenEXR file, deep, of several parts, or too large.
+        InputError: missing, no OpenEXR file, deep, or too large for the memory.
     """
     size = regular(path, MAP)
     try:
         with Path(path).open("rb") as file:
-            header = _parse(file.read(min(size, _LONGEST)))
+            headers = _parse(file.read(min(size, _LONGEST)))
     except (struct.error, ValueError, IndexError, OSError):
         raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
-    MAP.check(4 * header.width * header.height * header.channels, path)
-    if header.subsampled:
+    MAP.check(sum(header.bytes for header in headers), path)
+    if any(header.subsampled for header in headers):
         raise InputError("has channels of fewer pixels", str(path), "store all at full size")
-    if not _holds(header, size):
+    if not all(_holds(header, size) for header in headers):
         raise InputError("is cut short", str(path), "make it again")
-    return header
+    return headers
 
 
 def _holds(header: Header, size: int) -> bool:
@@ -70,36 +87,50 @@ def _holds(header: Header, size: int) -> bool:
     return header.tiled or chunks * _CHUNK <= size
 
 
-def _parse(data: bytes) -> Header:
+def _parse(data: bytes) -> tuple[Header, ...]:
     magic, version = struct.unpack_from("<ii", data, 0)
-    if magic != _MAGIC or version & (_DEEP | _PARTS):
-        raise ValueError("no picture of one part")
-    found = dict(_attributes(data))
+    if magic != _MAGIC or version & _DEEP:
+        raise ValueError("no picture")
+    at, headers = 8, []
+    while True:
+        found, at = _attributes(data, at)
+        headers.append(_header(found, tiled=bool(version & _TILED)))
+        # Of several parts, an empty header ends the list.
+        if not version & _PARTS or not data[at]:
+            return tuple(headers)
+
+
+def _header(found: dict[str, bytes], *, tiled: bool) -> Header:
+    kind = found.get("type", b"")
+    if kind.startswith(b"deep"):
+        raise ValueError("no picture")
     left, top, right, bottom = struct.unpack("<4i", found["dataWindow"])
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1:
         raise ValueError("no pixels")
-    compression = found["compression"][0]
+    x, y, x_last, y_last = struct.unpack("<4i", found.get("displayWindow", found["dataWindow"]))
     bytes_, samplings = _channels(found["channels"])
-    subsampled = any(s != (1, 1) for s in samplings)
-    tiled = bool(version & _TILED)
-    return Header(width, height, len(bytes_), sum(bytes_), compression, tiled, subsampled)
+    return Header(
+        width, height, len(bytes_), sum(bytes_), (top - y, left - x),
+        (max(1, y_last - y + 1), max(1, x_last - x + 1)), found["compression"][0],
+        tiled or kind.startswith(b"tiled"), any(s != (1, 1) for s in samplings),
+    )  # fmt: skip
 
 
-def _attributes(data: bytes) -> list[tuple[str, bytes]]:
-    at, found = 8, []
+def _attributes(data: bytes, at: int) -> tuple[dict[str, bytes], int]:
+    """Return a header's attributes and where it ends."""
+    found = {}
     while data[at]:
         name, at = _text(data, at)
         _, at = _text(data, at)
         (length,) = struct.unpack_from("<i", data, at)
         if length < 0 or at + 4 + length > len(data):
             raise ValueError("cut short")
-        found.append((name, data[at + 4 : at + 4 + length]))
+        found[name] = data[at + 4 : at + 4 + length]
         at += 4 + length
-    needed = {"dataWindow", "compression", "channels"}
-    if not needed <= {name for name, _ in found}:
+    if not {"dataWindow", "compression", "channels"} <= found.keys():
         raise ValueError("an attribute is missing")
-    return found
+    return found, at + 1
 
 
 def _channels(data: bytes) -> tuple[list[int], list[tuple[int, int]]]:

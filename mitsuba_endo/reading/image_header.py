@@ -1,10 +1,12 @@
 """Width and height in the headers of images, looked at before a library decodes them.
 
-Formats: PNG (RFC 2083), JPEG (ITU T.81), TIFF 6.0, BMP, Netpbm.
+Formats: PNG (RFC 2083), JPEG (ITU T.81), TIFF 6.0, BMP, Netpbm, WebP (RFC 9649).
 """
 
 import struct
 from collections.abc import Iterator
+
+from .tiff_tags import HEIGHT, WIDTH, directories
 
 _SLACK = 4096
 """Bytes of a text header that are read, and by which a file may seem too short. Chosen: a page."""
@@ -94,17 +96,25 @@ def _words(data: bytes) -> Iterator[bytes]:
 
 
 def _tiff(data: bytes) -> tuple[int, int]:
-    order = "<" if data[:2] == b"II" else ">"
-    (at,) = struct.unpack(f"{order}I", data[4:8])
-    (count,) = struct.unpack(f"{order}H", data[at : at + 2])
-    found: dict[int, int] = {}
-    for i in range(count):
-        entry = data[at + 2 + 12 * i : at + 14 + 12 * i]
-        tag, kind, number = struct.unpack(f"{order}HHI", entry[:8])
-        if number == 1 and kind in (3, 4):
-            form = "H" if kind == 3 else "I"
-            (found[tag],) = struct.unpack(f"{order}{form}", entry[8 : 8 + 2 * (kind - 2)])
-    return found.get(256, 0), found.get(257, 0)
+    found = next(directories(data))
+    return found.get(WIDTH, 0), found.get(HEIGHT, 0)
+
+
+def _webp(data: bytes) -> tuple[int, int]:
+    """Read the first chunk: lossy (RFC 6386), lossless, or the extended header."""
+    kind = data[12:16]
+    if data[8:12] != b"WEBP":
+        raise ValueError
+    if kind == b"VP8X":
+        (low, high, low_y, high_y) = struct.unpack("<HBHB", data[24:30])
+        return low + (high << 16) + 1, low_y + (high_y << 16) + 1
+    if kind == b"VP8L":
+        (bits,) = struct.unpack("<I", data[21:25])
+        return (bits & 0x3FFF) + 1, (bits >> 14 & 0x3FFF) + 1
+    if kind != b"VP8 " or data[23:26] != b"\x9d\x01\x2a":
+        raise ValueError
+    width, height = struct.unpack("<HH", data[26:30])
+    return width & 0x3FFF, height & 0x3FFF
 
 
 def _check(needed: int, held: int) -> None:
@@ -118,6 +128,7 @@ _READERS = {
     b"BM": _bmp,
     b"II*\0": _tiff,
     b"MM\0*": _tiff,
+    b"RIFF": _webp,
     **{b"P%d" % kind: _netpbm for kind in range(1, 7)},
 }
 """By the first bytes of a file, which its format's specification gives."""

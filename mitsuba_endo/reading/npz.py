@@ -78,17 +78,7 @@ class Arrays:
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise ValueError("compressed in a way that NumPy does not write")
         with self._file.open(info) as member:
-            shape, fortran, dtype = _header(member)
-            if dtype.kind not in "biufcU" or dtype.hasobject or dtype.fields:
-                raise ValueError("no numbers or texts")
-            size = math.prod(shape) * dtype.itemsize
-            if any(n < 0 for n in shape) or size > info.file_size:
-                raise ValueError("larger than its file")
-            data = member.read(size + 1)
-            if len(data) != size:
-                raise ValueError("cut short")
-        array = np.frombuffer(bytearray(data), dtype) if size else np.zeros(0, dtype)
-        return array.reshape(shape, order="F" if fortran else "C")
+            return _array(member, info.file_size)
 
 
 @contextlib.contextmanager
@@ -116,6 +106,35 @@ def open_npz(path: str | Path, what: str = "npz file", todo: str = "make it agai
         if _is_array(path):
             raise InputError("is an array, not an npz file", str(path), "use numpy.savez") from None
         raise InputError(f"is not a readable {what}", str(path), todo) from None
+
+
+def read_npy(path: str | Path) -> NDArray[Any]:
+    """Return the array of an npy file.
+
+    Raises:
+        InputError: missing, damaged, or larger than the limit.
+    """
+    size = regular(path, ARRAYS)
+    try:
+        with Path(path).open("rb") as file:
+            return _array(file, size)
+    except _BROKEN:
+        raise InputError("is not a readable npy file", str(path), "make it again") from None
+
+
+def _array(file: IO[bytes], file_size: int) -> NDArray[Any]:
+    """Read an array that fills the rest of an open file."""
+    shape, fortran, dtype = _header(file)
+    if dtype.kind not in "biufcU" or dtype.hasobject or dtype.fields:
+        raise ValueError("no numbers or texts")
+    size = math.prod(shape) * dtype.itemsize
+    if any(n < 0 for n in shape) or size > file_size:
+        raise ValueError("larger than its file")
+    data = file.read(size + 1)
+    if len(data) != size:
+        raise ValueError("cut short")
+    array = np.frombuffer(bytearray(data), dtype) if size else np.zeros(0, dtype)
+    return array.reshape(shape, order="F" if fortran else "C")
 
 
 def _header(member: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

@@ -2,30 +2,24 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import atomic_path
-from ..reading.exr_header import check_exr
-from ..reading.npz import open_npz
-from ..reading.quiet import quiet
 from ..reading.regular import MAP, regular
+from .exr_files import write_exr
+from .map_arrays import CHANNELS, CORRELATION, COVARIANCE, COVARIANCES, READERS, WEIGHT
+from .map_convention import AS_STORED, OPTION, MapConvention, Size
 
-CHANNELS = ("projector.x", "projector.y")
-WEIGHT = "weight"
-"""Optional further channel of an EXR file, or array of an npz file."""
-COVARIANCE = "covariance"
-"""Optional array (H, W, 3) of an npz file; of an EXR file the channels :data:`COVARIANCES`."""
-COVARIANCES = ("covariance.xx", "covariance.xy", "covariance.yy")
-CORRELATION = "correlation_px"
-"""Optional number in an npz file, or attribute in an EXR file's header."""
 SUFFIXES = (".exr", ".npz")
+"""Of maps that are written."""
+READABLE = tuple(READERS)
+"""Of maps that are read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +45,33 @@ class CorrespondenceMap:
         return np.isfinite(self.q[..., 0]) & np.isfinite(self.q[..., 1])
 
 
-def load_map(path: str | Path) -> CorrespondenceMap:
-    """Read a map from OpenEXR (channels projector.x, projector.y) or npz (array ``map``).
+def load_map(
+    path: str | Path, convention: MapConvention = AS_STORED, size: Size | None = None
+) -> CorrespondenceMap:
+    """Read a map from OpenEXR (channels projector.x, projector.y), npz (array ``map``) or npy.
 
     A channel or array ``weight`` is optional; where it is not above zero, nothing is known. So are
     covariances, as channels or array, and the length over which errors are alike. Covariances
     without weights give the weights.
+
+    Args:
+        path: the file.
+        convention: how its maker counts and orders coordinates.
+        size: of the pattern, where the convention depends on it.
 
     Raises:
         InputError: missing file, missing channels, wrong shape, nothing finite, wrong units.
     """
     path = Path(path)
     regular(path, MAP)
-    check_map_path(path)
-    read = _read_exr(path) if path.suffix.lower() == ".exr" else _read_npz(path)
-    q, weight, covariance = read.q, read.weight, read.covariance
+    check_map_path(path, READABLE)
+    read = READERS[path.suffix.lower()](path, convention.channels)
+    q, covariance = convention.coordinates(read.q, size), read.covariance
+    weight = None if read.weight is None else convention.upright(read.weight)
     known = np.asarray(np.isfinite(q).all(-1))
     if covariance is not None:
-        check_covariance(covariance, q, str(path))
+        check_covariance(covariance, read.q, str(path))
+        covariance = convention.covariance(covariance, size)
         known &= np.isfinite(covariance).all(-1)
         weight = relative_weight(covariance) if weight is None else weight
     if weight is not None:
@@ -78,6 +81,18 @@ def load_map(path: str | Path) -> CorrespondenceMap:
     q = np.where(known[..., None], q, np.float32(np.nan))
     _check(q, str(path))
     return CorrespondenceMap(q, path.name, weight, covariance, read.correlation_px)
+
+
+def load_maps(
+    paths: Sequence[Path], convention: MapConvention = AS_STORED, size: Size | None = None
+) -> list[CorrespondenceMap]:
+    """Read maps, calling files of one name in several folders by folder and name.
+
+    Raises:
+        InputError: as :func:`load_map`.
+    """
+    named = zip(paths, frame_names(paths), strict=True)
+    return [replace(load_map(path, convention, size), name=name) for path, name in named]
 
 
 def frame_names(paths: Sequence[Path]) -> list[str]:
@@ -150,95 +165,15 @@ def save_map(
     write_exr(path, {name: q[..., i] for i, name in enumerate(CHANNELS)} | (further or {}), numbers)
 
 
-def write_exr(
-    path: str | Path,
-    channels: dict[str, NDArray[np.floating]],
-    attributes: dict[str, float] | None = None,
-) -> None:
-    """Write (H, W) channels as a float32 OpenEXR file, with numbers in its header.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    arrays = {k: np.ascontiguousarray(v, dtype=np.float32) for k, v in channels.items()}
-    with atomic_path(path) as aside:
-        try:
-            OpenEXR.File(header | (attributes or {}), arrays).write(str(aside))
-        except RuntimeError as error:  # how OpenEXR reports a full disk
-            raise OSError(str(error)) from error
-
-
-def read_exr(path: str | Path) -> dict[str, NDArray[np.float32]]:
-    """Read every channel of an OpenEXR file as (H, W) float32.
-
-    Raises:
-        InputError: missing or damaged file.
-    """
-    check_exr(path)
-    try:
-        with quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
-            return {k: np.array(c.pixels, np.float32) for k, c in file.channels().items()}
-    except (RuntimeError, ValueError, TypeError, MemoryError):
-        raise InputError("is not a readable OpenEXR file", str(path), "make it again") from None
-
-
-def check_map_path(path: Path) -> None:
+def check_map_path(path: Path, suffixes: Sequence[str] = SUFFIXES) -> None:
     """Refuse, before any work is done, a path that is not that of a map.
 
     Raises:
-        InputError: a suffix other than .exr and .npz.
+        InputError: another suffix than those given.
     """
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"unknown kind of map '{path.suffix}'", str(path), "give an .exr or .npz file"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class _Read:
-    """What a file holds, before it is checked."""
-
-    q: NDArray[np.float32]
-    weight: NDArray[np.float32] | None
-    covariance: NDArray[np.float32] | None
-    correlation_px: float | None
-
-
-def _read_exr(path: Path) -> _Read:
-    channels = read_exr(path)
-    given = [name for name in COVARIANCES if name in channels]
-    wanted = CHANNELS + (COVARIANCES if given else ())
-    missing = [name for name in wanted if name not in channels]
-    if missing:
-        raise InputError(
-            f"channel {missing[0]} is missing", str(path), f"name them {' and '.join(wanted)}"
-        )
-    q = np.stack([channels[name] for name in CHANNELS], -1)
-    covariance = np.stack([channels[name] for name in COVARIANCES], -1) if given else None
-    with quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
-        found = file.header().get(CORRELATION)
-    correlation = float(found) if isinstance(found, (int, float)) else None
-    return _Read(q, channels.get(WEIGHT), covariance, correlation)
-
-
-def _read_npz(path: Path) -> _Read:
-    with open_npz(path) as arrays:
-        if "map" not in arrays:
-            raise InputError("array 'map' is missing", str(path), "save it as map=HxWx2")
-        q = arrays.get("map", kinds="fiubcU")
-        weight, covariance = (
-            arrays.get(name).astype(np.float32) if name in arrays else None
-            for name in (WEIGHT, COVARIANCE)
-        )
-        correlation = float(arrays.get(CORRELATION, ())) if CORRELATION in arrays else None
-    if q.ndim != 3 or q.shape[2] != 2 or q.dtype.kind not in "fiu":
-        raise InputError(
-            f"array 'map' is {q.dtype} {'x'.join(map(str, q.shape))}", str(path),
-            "store projector x and y as numbers, HxWx2",
-        )  # fmt: skip
-    with np.errstate(over="ignore"):  # what single precision cannot hold is no coordinate
-        return _Read(q.astype(np.float32), weight, covariance, correlation)
+    if path.suffix.lower() not in suffixes:
+        kinds = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
+        raise InputError(f"unknown kind of map '{path.suffix}'", str(path), f"give an {kinds} file")
 
 
 def check_covariance(
@@ -285,8 +220,10 @@ def _check(q: NDArray[np.float32], source: str) -> None:
     finite = q[np.isfinite(q).all(-1)]
     if not len(finite):
         raise InputError("the map has no finite value", source, "check how it was decoded")
-    if finite.min() >= 0 and finite.max() <= 1:
+    if np.abs(finite).max() <= 1:
+        low = "0" if finite.min() >= 0 else "-1"
         raise InputError(
-            "all projector coordinates lie between 0 and 1", source,
-            "give them in pattern pixels, not normalised",
+            f"all projector coordinates lie between {low} and 1", source,
+            f"give them in pattern pixels, or state {OPTION} normalised"
+            + (",signed" if low == "-1" else ""),
         )  # fmt: skip

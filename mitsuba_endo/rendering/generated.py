@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..description import read_description
-from ..records.correspondence import write_exr
+from ..records.exr_files import write_exr
 from ..shapes import make_shape
 from .pattern import make_pattern
 

@@ -45,7 +45,13 @@ def render_capture(loaded: LoadedScene, spp: int = 64, seed: int = 0, name: str 
         spp: samples per pixel of the image; geometry is exact and needs none.
         seed: seed of the image's noise.
         name: name of the frame in the truth.
+
+    Raises:
+        InputError: a scalar variant of Mitsuba is active.
     """
+    from .. import backend
+
+    backend.ensure_vectorised()
     from .mitsuba_modules import mi
 
     sensor = loaded.sensor()

@@ -11,6 +11,7 @@ from ..records.consistency import check_maps
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from .camera_matrix import focal_units, principal_point
+from .coordinate_units import half_precision, normalised, one_based
 from .finding import Check, Finding
 from .handedness import handedness
 from .lens_fold import lens_fold
@@ -18,7 +19,8 @@ from .missing_values import missing_values
 from .projector_intrinsics import projector_focal
 
 CHECKS: tuple[Check, ...] = (
-    focal_units, principal_point, handedness, lens_fold, projector_focal
+    normalised, focal_units, principal_point, handedness, lens_fold, projector_focal, one_based,
+    half_precision,
 )  # fmt: skip
 """In the order in which they run: a camera matrix in other units also folds its lens."""
 

@@ -35,10 +35,14 @@ REFLECTIONS = {
 }  # fmt: skip
 """dq/dp of an upright camera and projector whose map is wrong, by name, and what to say."""
 MENDING = {
-    "x_mirrored": "store width - 1 - x, or turn off rear projection or the camera's mirroring",
-    "y_upwards": "store height - 1 - y, counted from the pattern's top row",
-    "swapped": "store x, the pattern's column, first, and index the map by row and column",
-    "swapped_and_turned": "store x, the pattern's column, first, counted from the pattern's left",
+    "x_mirrored": "store width - 1 - x (or state --map-convention x-mirrored), or turn off rear "
+    "projection or the camera's mirroring",
+    "y_upwards": "store height - 1 - y, counted from the pattern's top row, or state "
+    "--map-convention y-upwards",
+    "swapped": "store x, the pattern's column, first, and index the map by row and column, or "
+    "state --map-convention swapped or transposed",
+    "swapped_and_turned": "store x, the pattern's column, first, counted from the pattern's left, "
+    "or state --map-convention swapped,x-mirrored,y-upwards",
     "mirrored": "check the directions of x and y in the map, and turn off mirroring",
 }
 

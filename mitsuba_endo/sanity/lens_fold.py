@@ -8,8 +8,9 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from .finding import Finding
 
-MAX_FOLDED = 0.5
-"""Share of the correspondences beyond the fold from which the lens is refused."""
+MAX_FOLDED = 0.1
+"""Share of the correspondences beyond the fold from which the lens is refused: more than the
+corners, to which many a calibration does not reach, is another lens or another image. Chosen."""
 
 
 def lens_fold(maps: Sequence[CorrespondenceMap], rig: Rig) -> list[Finding]:

@@ -8,7 +8,8 @@ from ..files import atomic_folder
 from ..folder_mark import Kind
 from ..png import write_png
 from ..records.calibration import SurfaceEstimate
-from ..records.correspondence import save_map, write_exr
+from ..records.correspondence import save_map
+from ..records.exr_files import write_exr
 from ..records.known_input import known_rig, save_rig
 from ..records.solution import save_solution
 from ..records.surface import save_surface

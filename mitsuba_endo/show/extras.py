@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..files import atomic_path
 from ..png import write_png
 from ..records.calibration import Calibration
-from ..records.correspondence import write_exr
+from ..records.exr_files import write_exr
 from . import figures
 from .frame_views import FrameViews
 from .map_names import file_names

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..decoding.grid_pattern import GridTruth
-from ..records.correspondence import write_exr
+from ..records.exr_files import write_exr
 
 GRID_TRUTH = "truth_grid.exr"
 """No map: it has no channel that a solver reads."""

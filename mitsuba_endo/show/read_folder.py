@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..reading.regular import TABLE, is_file, read_text
 from ..records.calibration import Calibration, FrameMaps, SurfaceEstimate, TraceRow
-from ..records.correspondence import CHANNELS, read_exr, write_exr
+from ..records.exr_files import read_exr, write_exr
 from ..records.history import load_history
+from ..records.map_arrays import CHANNELS
 from ..records.solution import load_solution
 from ..records.surface import load_with_modes
 from .map_names import map_names, observed_names, own_surface_name

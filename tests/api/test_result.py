@@ -13,7 +13,8 @@ import yaml
 import mitsuba_endo as me
 from mitsuba_endo import backend
 from mitsuba_endo.errors import NothingDecodedError
-from mitsuba_endo.records.correspondence import CorrespondenceMap, read_exr, save_map
+from mitsuba_endo.records.correspondence import CorrespondenceMap, save_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.solve.options import Options
 from tests.decoding.grid_views import CAMERA, photo, view

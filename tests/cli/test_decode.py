@@ -10,7 +10,8 @@ import yaml
 from scipy.ndimage import gaussian_filter
 
 from mitsuba_endo.decoding.grid_pattern import CodedGrid
-from mitsuba_endo.records.correspondence import load_map, read_exr
+from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import Camera
 from tests.cli.inputs import run
 from tests.decoding.grid_views import CAMERA, HEIGHT, SIZE, WIDTH, photo, view

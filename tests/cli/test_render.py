@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from mitsuba_endo.records.correspondence import load_map, read_exr
+from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import load_rig
 from mitsuba_endo.records.solution import load_solution
 from mitsuba_endo.records.surface import load_surface

@@ -11,12 +11,11 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.correspondence import (
     CorrespondenceMap,
     load_map,
-    read_exr,
     relative_weight,
     save_map,
-    write_exr,
     write_map,
 )
+from mitsuba_endo.records.exr_files import read_exr, write_exr
 
 HEIGHT, WIDTH = 5, 9
 
@@ -131,12 +130,16 @@ def _one_channel(path: Path) -> Path:
     ("make", "name", "message"),
     [
         (lambda p: p, "none.npz", "no such file; check the path"),
-        (_text, "m.png", "unknown kind of map '.png'; give an .exr or .npz file"),
+        (_text, "m.png", "unknown kind of map '.png'; give an .exr, .npz or .npy"),
         (_truncated, "m.npz", "is not a readable npz file"),
         (_damaged_npz, "m.npz", "is not a readable npz file"),
         (_array_named_npz, "m.npz", "is an array, not an npz file"),
         (_text, "m.npz", "is not a readable npz file"),
-        (lambda p: _npz(p, q=_q()), "m.npz", "array 'map' is missing; save it as map=HxWx2"),
+        (
+            lambda p: _npz(p, q=_q(), r=_q()),
+            "m.npz",
+            "array 'map' is missing among 'q, r'",
+        ),
         (lambda p: _npz(p, map=_q()[..., 0]), "m.npz", "array 'map' is float32 5x9"),
         (lambda p: _npz(p, map=_q() + 1j), "m.npz", "array 'map' is complex64 5x9x2"),
         (_truncated, "m.exr", "is not a readable OpenEXR file"),
@@ -146,7 +149,11 @@ def _one_channel(path: Path) -> Path:
         (lambda p: _npz(p, map=_q(), weight=4 * np.ones((5, 9))), "m.npz", "from 4 to 4; divide"),
         (lambda p: _npz(p, map=_q(), weight=_endless()), "m.npz", "from 0.5 to inf; divide"),
         (lambda p: _npz(p, map=_q() * np.nan), "m.npz", "the map has no finite value"),
-        (lambda p: _npz(p, map=_q() / 1000 % 1), "m.npz", "lie between 0 and 1; give them in"),
+        (
+            lambda p: _npz(p, map=_q() / 1000 % 1),
+            "m.npz",
+            "state --map-convention normalised",
+        ),
     ],
 )
 def test_bad_maps_end_with_a_sentence(tmp_path: Path, make, name: str, message: str):

@@ -23,7 +23,8 @@ from mitsuba_endo.reading.file_storage import read_file_storage
 from mitsuba_endo.reading.regular import IMAGE, MAP, SizeLimit, is_file, read_bytes, regular
 from mitsuba_endo.reading.trees import read_json, read_yaml
 from mitsuba_endo.reading.xml_guard import read_xml
-from mitsuba_endo.records.correspondence import load_map, read_exr, save_map, write_exr
+from mitsuba_endo.records.correspondence import load_map, save_map
+from mitsuba_endo.records.exr_files import read_exr, write_exr
 from mitsuba_endo.records.rig import load_rig
 from mitsuba_endo.records.solution import load_solution
 from mitsuba_endo.records.surface import load_surface

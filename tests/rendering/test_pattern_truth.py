@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.records.correspondence import load_map, read_exr
+from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.rendering.pattern_truth import coded_grid, grid_truth
 from mitsuba_endo.rendering.render import render_capture
 from mitsuba_endo.rendering.scene import load_scene

@@ -16,7 +16,8 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.records.calibration import Calibration
-from mitsuba_endo.records.correspondence import load_map, read_exr
+from mitsuba_endo.records.correspondence import load_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import Rig, load_rig
 from mitsuba_endo.records.solution import Estimate, LeftOut, PoseEstimate, load_solution
 from mitsuba_endo.records.surface import load_surface
