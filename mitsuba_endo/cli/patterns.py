@@ -78,7 +78,7 @@ def _coded(out: Path, kind: str, width: int, height: int) -> tuple[list[str], st
 def _no_stack(
     inverse: bool,
     reference: bool,
-    stripe: int | None,
+    stripe: float | None,
     periods: str | None,
     steps: int | None,
 ) -> None:
@@ -104,7 +104,7 @@ def _command(plan: "StackPlan") -> str:
         f"--width {plan.width} --height {plan.height}",
         f"--reference {'first' if plan.reference else 'none'}",
         "--inverse" if plan.inverse else "",
-        f"--stripe {plan.stripe}" if plan.stripe else "",
+        f"--stripe {plan.stripe:g}" if plan.stripe else "",
         f"--periods {','.join(f'{p:g}' for p in plan.periods)}" if plan.periods else "",
         f"--steps {plan.steps}" if plan.steps else "",
         f"--convention {','.join(own_convention(plan).words(plan))}",

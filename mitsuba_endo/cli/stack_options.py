@@ -14,7 +14,7 @@ Inverse = Annotated[bool, typer.Option("--inverse", help="An inverse follows eac
 Reference = Annotated[
     bool, typer.Option("--reference/--no-reference", help="A white and a black image come first.")
 ]
-Stripe = Annotated[int | None, typer.Option(help="Narrowest Gray stripe, pattern pixels.")]
+Stripe = Annotated[float | None, typer.Option(help="Narrowest Gray stripe, pattern pixels.")]
 Periods = Annotated[
     str | None, typer.Option(help="Phase periods, pattern pixels, coarsest first: 600,96,16.")
 ]
@@ -27,7 +27,7 @@ def make_plan(
     height: int,
     inverse: bool,
     reference: bool,
-    stripe: int | None,
+    stripe: float | None,
     periods: str | None,
     steps: int | None,
 ) -> "StackPlan":

@@ -16,14 +16,16 @@ from .axis_images import AxisImages, labels_needed
 from .conventions import OPTION, StackConvention, StackOrder, Stated, orders
 from .fringes import fringe_coordinate, within
 from .gray_code import Code, read_stripes, stripe_count
+from .gray_interpolation import edge_distances
 from .phase_search import periods_agree, phase_conventions
 from .phase_shift import PhaseConvention
 from .plan import AXES, Axis, StackPlan
+from .possible_plans import ONE_DIRECTION, PossiblePlans
 from .sample_map import AxisMap, SampleMap, joined
 from .stack import nothing_lit
 from .stack_images import StackSource
 from .stack_samples import StackSamples, take_samples
-from .stripes import BIT_OVER_NOISE, CERTAIN, most_left_out
+from .stripes import BIT_OVER_NOISE, CERTAIN, most_left_out, thirds
 
 WHOLLY = 0.9
 """Of the lit pixels that must be brightest under white, and darkest under black."""
@@ -65,7 +67,7 @@ class Hypothesis:
         plan = self.plan
         options = [
             f"--pattern {plan.kind}",
-            f"--stripe {plan.stripe}" if plan.stripe else "",
+            f"--stripe {plan.stripe:g}" if plan.stripe else "",
             f"--steps {plan.steps}" if plan.steps else "",
             f"{OPTION} {','.join(self.words())}",
         ]
@@ -74,7 +76,7 @@ class Hypothesis:
 
 def find_convention(
     stack: StackSource,
-    plans: Sequence[StackPlan],
+    possible: PossiblePlans,
     stated: Stated,
     reference: str | None,
     noise: float,
@@ -85,7 +87,7 @@ def find_convention(
 
     Args:
         stack: the images.
-        plans: that have as many images.
+        possible: plans that have as many images.
         stated: what is known of the convention.
         reference: where the white and the black image are, "first", "last", "none"; None: found.
         noise: standard deviation of the brightness.
@@ -101,7 +103,7 @@ def find_convention(
         raise nothing_lit(need)
     tried = [
         (plan, pair, order)
-        for plan in plans
+        for plan in possible.plans
         for pair in _references(samples, plan, reference)
         for order in orders(plan, stated)
     ]
@@ -109,7 +111,7 @@ def find_convention(
     for k, (plan, pair, order) in enumerate(tried):
         found += _readings(samples, plan, pair, order, stated)
         advance((k + 1) / len(tried))
-    return _best(found, len(tried))
+    return _best(found, len(tried), possible.one_direction)
 
 
 def _references(
@@ -234,24 +236,30 @@ def _middles(
     width = np.full(spread.shape, np.float32(plan.stripe))
     left = np.ones(spread.shape, bool)
     for level in range(most_left_out(plan, axis) + 1):
-        stripe = plan.stripe << level
+        stripe = plan.stripe * 2**level
         index, certain = read_stripes(signal[: len(signal) - level], doubt, plan.code)
         certain &= left
         left &= ~certain
         inside = certain & (index < stripe_count(plan.size[axis], stripe))
         # Those beyond the pattern stay, to be counted.
-        q[certain], width[certain] = (index[certain] + 0.5) * stripe - 0.5, stripe
+        place = 0.5
+        if plan.fringe_is_stripe:
+            noises = np.broadcast_to(spread, signal.shape)[:, certain]
+            ways = edge_distances(index[certain], signal[:, certain], noises, plan.code)
+            place = thirds(ways.way)
+        q[certain], width[certain] = (index[certain] + place) * stripe - 0.5, stripe
         q[certain & ~inside] = np.inf
     return q, width
 
 
-def _best(found: Sequence[Hypothesis], tried: int) -> Hypothesis:
+def _best(found: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypothesis:
     ranked = sorted(found, key=lambda one: -one.map.share)
     if not ranked or ranked[0].map.share < LEAST_SHARE:
         share = f"; the best makes sense of {100 * ranked[0].map.share:.0f} %" if ranked else ""
         raise InputError(
             f"none of {tried} orders and codes fits the images{share}", "stack",
-            f"check the pattern's size and its options, and the focus, or state {OPTION}",
+            f"check the pattern's size and its options, and the focus, or state {OPTION}"
+            + (f"; {ONE_DIRECTION}" if one_direction else ""),
         )  # fmt: skip
     best = ranked[0]
     for other in ranked[1:]:

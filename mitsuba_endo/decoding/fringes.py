@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_images import AxisImages
-from .phase_shift import phase_noise, refine, unroll_coarsest, wrapped_coordinate
+from .heterodyne import unwrap
+from .phase_shift import MAX_DEVIATION, phase_noise, refine, unroll_coarsest, wrapped_coordinate
 from .plan import Axis, StackPlan
 
 
@@ -28,15 +29,25 @@ def fringe_coordinate(
         coarse: coordinate of the code that tells the fringe; None: the coarsest period does.
         noise: standard deviation of the brightness.
     """
-    q = coarse
+    q, all_fine = coarse, list[NDArray[np.float32]]()
     contrast = images.contrast
     spread = np.zeros_like(contrast)
+    # A stripe that is one fringe tells its number; half of one tells which is nearer.
+    most = 0.5 if plan.fringe_is_stripe else MAX_DEVIATION
     for period, waves, full in zip(plan.periods, images.waves, saturated, strict=True):
         fine, swing = wrapped_coordinate(waves, period, plan.phase)
         contrast = np.minimum(contrast, swing)
         spread = phase_noise(swing, noise, period, plan.steps).astype(np.float32)
         fine[full] = np.nan
-        q = unroll_coarsest(fine, period, plan.size[axis]) if q is None else refine(q, fine, period)
+        all_fine.append(fine)
+        if plan.heterodyne:
+            continue
+        if q is None:
+            q = unroll_coarsest(fine, period, plan.size[axis])
+        else:
+            q = refine(q, fine, period, most)
+    if plan.heterodyne:
+        q = unwrap(all_fine, plan.periods, plan.size[axis])
     assert q is not None, "a plan has a code or a period"
     return q, spread, contrast
 

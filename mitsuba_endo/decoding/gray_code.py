@@ -4,27 +4,30 @@ Neighbouring stripes of Gray code differ in one bit (F. Gray, US patent 2632058)
 straddles an edge is in doubt about one bit only, and both readings of it are neighbours.
 """
 
+import math
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+WHOLE = 1e-9
+"""Stripes by which a boundary may miss a whole pixel by rounding."""
 Code = Literal["gray", "binary"]
 
 
-def stripe_count(size: int, stripe: int) -> int:
+def stripe_count(size: int, stripe: float) -> int:
     """Return the stripes of ``stripe`` pixels that ``size`` pattern pixels hold."""
-    return -(-size // stripe)
+    return math.ceil(size / stripe - WHOLE)
 
 
-def bit_count(size: int, stripe: int = 1) -> int:
+def bit_count(size: int, stripe: float = 1) -> int:
     """Return the bits that tell the stripes of ``size`` pattern pixels apart."""
     return max(1, (stripe_count(size, stripe) - 1).bit_length())
 
 
-def bit_images(size: int, stripe: int = 1, code: Code = "gray") -> NDArray[np.float32]:
+def bit_images(size: int, stripe: float = 1, code: Code = "gray") -> NDArray[np.float32]:
     """Return the profile of each bit along the axis, (bits, size) of 0 and 1, coarsest first."""
-    index = np.arange(size, dtype=np.int64) // stripe
+    index = np.floor(np.arange(size) / stripe + WHOLE).astype(np.int64)
     word = index ^ (index >> 1) if code == "gray" else index
     shift = np.arange(bit_count(size, stripe))[::-1, None]
     return ((word >> shift) & 1).astype(np.float32)

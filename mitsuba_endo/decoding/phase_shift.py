@@ -86,10 +86,20 @@ def unroll_coarsest(
 
 
 def refine(
-    coarse: NDArray[np.float32], coordinate: NDArray[np.float32], period: float
+    coarse: NDArray[np.float32],
+    coordinate: NDArray[np.float32],
+    period: float,
+    most: float = MAX_DEVIATION,
 ) -> NDArray[np.float32]:
-    """Return the coordinate of a finer period next to the coarse one; NaN where they disagree."""
+    """Return the coordinate of a finer period next to the coarse one; NaN where they disagree.
+
+    Args:
+        coarse: pattern pixels.
+        coordinate: of the finer period, modulo it.
+        period: pattern pixels.
+        most: periods by which they may disagree.
+    """
     apart = (coarse - coordinate) / period
     fringe = np.round(apart)
     q = coordinate + fringe * period
-    return np.where(np.abs(apart - fringe) > MAX_DEVIATION, np.nan, q).astype(np.float32)
+    return np.where(np.abs(apart - fringe) > most, np.nan, q).astype(np.float32)

@@ -1,13 +1,12 @@
 """Which images a structured-light stack holds, and in which order."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from ..errors import InputError
 from .gray_code import Code, bit_count
+from .heterodyne import separation
 from .phase_shift import COSINE, PhaseConvention
 
 Kind = Literal["gray", "phase", "gray+phase"]
@@ -23,6 +22,8 @@ STRIPES = (1, 2, 4, 8, 16, 32)
 """Narrowest stripes that are looked for, pattern pixels."""
 STEPS = range(3, 13)
 """Phase steps per period that are looked for."""
+LEAST_APART = 0.05
+"""Turns by which the phases of two places must differ: twice the noise of bad photographs."""
 SPARE = 1.1
 """Coarsest default period over the pattern's longer side, so that noise cannot wrap it."""
 
@@ -47,8 +48,9 @@ class StackPlan:
     """The stack begins with a white and a black image."""
     inverse: bool
     """Each Gray bit is followed by its inverse."""
-    stripe: int
-    """Width of the narrowest Gray stripe, pattern pixels; 0 without Gray code."""
+    stripe: float
+    """Width of the narrowest Gray stripe, pattern pixels; 0 without Gray code. Stripe k begins at
+    the first whole pixel from k stripes on."""
     periods: tuple[float, ...]
     """Pattern pixels, coarsest first; empty without phase."""
     steps: int
@@ -67,7 +69,7 @@ class StackPlan:
         *,
         reference: bool = True,
         inverse: bool = False,
-        stripe: int | None = None,
+        stripe: float | None = None,
         periods: tuple[float, ...] | None = None,
         steps: int | None = None,
     ) -> "StackPlan":
@@ -105,6 +107,16 @@ class StackPlan:
         """Its stripe and its steps are those by default."""
         usual = StackPlan.make(self.kind, self.width, self.height, periods=self.periods or None)
         return (usual.stripe, usual.steps) == (self.stripe, self.steps)
+
+    @property
+    def heterodyne(self) -> bool:
+        """No period spans the pattern: all of them together tell where a pixel lies."""
+        return self.kind == "phase" and self.periods[0] < max(self.width, self.height)
+
+    @property
+    def fringe_is_stripe(self) -> bool:
+        """Each stripe is one fringe, so that the code counts fringes and cannot halve them."""
+        return self.kind == "gray+phase" and self.stripe == self.periods[0]
 
     @property
     def size(self) -> dict[Axis, int]:
@@ -166,10 +178,10 @@ def _checked_periods(
         raise InputError("they do not fall", "periods", "give them from the coarsest to the finest")
     if kind == "gray+phase" and len(periods) != 1:
         raise InputError(f"{len(periods)} given", "periods", "a gray+phase stack has one")
-    if kind == "phase" and periods[0] < extent:
+    if kind == "phase" and periods[0] < extent and separation(periods, extent) < LEAST_APART:
         raise InputError(
-            f"the coarsest, {periods[0]:g}, is shorter than the pattern's {extent} pixels",
-            "periods", "begin with one that spans the pattern, or use gray+phase",
+            f"they do not tell all of the pattern's {extent} pixels apart", "periods",
+            "begin with one that spans the pattern, take others, or use gray+phase",
         )  # fmt: skip
     return tuple(float(p) for p in periods)
 
@@ -182,100 +194,18 @@ def default_periods(extent: int) -> tuple[float, ...]:
     return tuple(float(round(FINEST_PERIOD * ratio**k)) for k in reversed(range(levels + 1)))
 
 
-def _checked_stripe(kind: Kind, extent: int, periods: tuple[float, ...], stripe: int | None) -> int:
+def _checked_stripe(
+    kind: Kind, extent: int, periods: tuple[float, ...], stripe: float | None
+) -> float:
     if kind == "phase":
         return 0
     if stripe is None:
         return 1 if kind == "gray" else min(2 ** int(math.log2(periods[0] / 2)), extent // 2)
     if not 1 <= stripe <= extent // 2:
-        raise InputError(f"{stripe} is out of range", "stripe", f"give 1 to {extent // 2}")
-    if kind == "gray+phase" and stripe > periods[0] / 2:
+        raise InputError(f"{stripe:g} is out of range", "stripe", f"give 1 to {extent // 2}")
+    if kind == "gray+phase" and stripe > periods[0] / 2 and stripe != periods[0]:
         raise InputError(
-            f"{stripe} pixels cannot tell fringes of {periods[0]:g} pixels apart", "stripe",
-            "give at most half the period",
+            f"{stripe:g} pixels cannot tell fringes of {periods[0]:g} pixels apart", "stripe",
+            "give the period, or at most half of it",
         )  # fmt: skip
     return stripe
-
-
-def possible_plans(
-    images: int,
-    width: int,
-    height: int,
-    *,
-    kind: Kind | None = None,
-    reference: bool | None = None,
-    inverse: bool | None = None,
-    stripe: int | None = None,
-    periods: tuple[float, ...] | None = None,
-    steps: int | None = None,
-) -> list[StackPlan]:
-    """Return the plans with this number of images, the commonest first.
-
-    Args:
-        images: of the stack.
-        width: of the pattern, pixels.
-        height: of the pattern, pixels.
-        kind: None: any; likewise of the others, see :meth:`StackPlan.make`.
-        reference: a white and a black image are among them.
-        inverse: each bit has its inverse.
-        stripe: narrowest stripe.
-        periods: of the phases, pattern pixels.
-        steps: per period.
-
-    Raises:
-        InputError: a value out of range, one that this kind of stack has no use for, or no plan
-            that fits it has so many images.
-    """
-    kinds: tuple[Kind, ...] = get_args(Kind) if kind is None else (kind,)
-    plans: list[StackPlan] = []
-    refusals: list[InputError] = []
-    for one in kinds:
-        try:
-            StackPlan.make(one, width, height, inverse=bool(inverse), stripe=stripe,
-                           periods=periods, steps=steps)  # fmt: skip
-        except InputError as refusal:
-            refusals.append(refusal)
-            continue
-        for choice in _choices(one, width, height, reference, inverse, stripe, periods, steps):
-            plan = StackPlan.make(one, width, height, **choice)
-            if plan not in plans:
-                plans.append(plan)
-    if len(refusals) == len(kinds):
-        raise refusals[0]
-    fitting = [plan for plan in plans if len(plan.labels()) == images]
-    if not fitting:
-        usual = [plan for plan in plans if plan.usual or (stripe or steps)]
-        counts = sorted({len(plan.labels()) for plan in usual})
-        one = f"this pattern has {counts[0]}"
-        several = f"such patterns have {', '.join(map(str, counts))}"
-        raise InputError(
-            f"{images} images, but {one if len(counts) == 1 else several}", "stack",
-            "check the pattern's size and its options against what was projected",
-        )  # fmt: skip
-    return fitting
-
-
-def _choices(
-    kind: Kind,
-    width: int,
-    height: int,
-    reference: bool | None,
-    inverse: bool | None,
-    stripe: int | None,
-    periods: tuple[float, ...] | None,
-    steps: int | None,
-) -> Iterator[dict[str, Any]]:
-    """Yield what may be given to :meth:`StackPlan.make`, with what is not known filled in."""
-    finest = periods[0] if periods else FINEST_PERIOD
-    widest = min(width, height) // 2 if kind == "gray" else finest / 2
-    wide = [w for w in STRIPES if w <= widest]
-    fill = {
-        "reference": (True, False) if reference is None else (reference,),
-        "inverse": ((False, True) if inverse is None else (inverse,)) if kind != "phase" else (),
-        "stripe": ([None, *wide] if stripe is None else [stripe]) if kind != "phase" else (),
-        "periods": (periods,) if kind != "gray" else (),
-        "steps": (([None, *STEPS]) if steps is None else [steps]) if kind != "gray" else (),
-    }
-    used = {name: values for name, values in fill.items() if values}
-    for values in product(*used.values()):
-        yield dict(zip(used, values, strict=True))

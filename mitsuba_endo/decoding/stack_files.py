@@ -110,7 +110,7 @@ def labelled_plan(
     kind: Kind | None,
     width: int,
     height: int,
-    stripe: int | None,
+    stripe: float | None,
     stated: dict[str, Any],
 ) -> StackPlan:
     """Return the plan that labels tell of, and what is stated otherwise.

@@ -8,7 +8,8 @@ from ..errors import InputError
 from .convention_search import find_convention
 from .conventions import NOTHING, OPTION, Stated, own_convention
 from .image_files import ImageSource
-from .plan import Kind, StackPlan, possible_plans
+from .plan import Kind, StackPlan
+from .possible_plans import PossiblePlans, possible_plans
 from .stack import CONTRAST_OVER_NOISE, MIN_CONTRAST
 from .stack_files import check_names, labelled_plan, labels_of
 from .stack_images import StackSource, estimate_noise
@@ -28,7 +29,7 @@ class StackRequest:
     """Each bit has its inverse."""
     reference: Reference | None = None
     """Where the white and the black image are."""
-    stripe: int | None = None
+    stripe: float | None = None
     """Narrowest stripe, pattern pixels."""
     periods: tuple[float, ...] | None = None
     """Of the phases, pattern pixels; the default ones if not given."""
@@ -49,7 +50,7 @@ class StackRequest:
             if value is not None and value not in choices:
                 raise InputError(f"unknown '{value}'", name, f"choose {', '.join(choices)}")
 
-    def plans(self, images: int) -> list[StackPlan]:
+    def plans(self, images: int) -> PossiblePlans:
         """Return the plans that a stack of so many images may have.
 
         Raises:
@@ -118,14 +119,21 @@ def find_reading(
         InputError: no reading makes sense, or two do.
         NothingDecodedError: no pixel is lit.
     """
-    plans = [plan for plan in request.plans(len(stack)) if request.convention.fits(plan)]
-    if not plans:
+    possible = request.plans(len(stack))
+    possible = possible.that(request.convention.fits)
+    if not possible.plans:
         raise InputError(
             "states what such a stack does not have", OPTION, "leave out phases, bits or inverses"
         )
     noise = estimate_noise(stack)
     need = max(min_contrast, CONTRAST_OVER_NOISE * noise)
     best = find_convention(
-        stack, plans, request.convention, request.reference, noise, need, advance
+        stack,
+        possible,
+        request.convention,
+        request.reference,
+        noise,
+        need,
+        advance,
     )
     return StackReading(best.plan, best.positions, tuple(best.words()), "images")

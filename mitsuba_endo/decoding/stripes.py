@@ -26,6 +26,8 @@ REACH = 5
 """Pixels around in which a bit's amplitude is sought. By hand: half a period of fine stripes."""
 HALO = 2 * REACH
 """Rows beyond a strip that its pixels' amplitudes depend on."""
+BEGIN = np.float32(1e-3)
+"""Pixels by which a stripe's beginning may miss a whole one by rounding."""
 BORDER = 2
 """Stripes at the pattern's ends whose places are not to be trusted."""
 UNKNOWN_NOISE = np.float32(100)
@@ -92,7 +94,7 @@ def read_bits(images: AxisImages, plan: StackPlan, axis: Axis, noise: float) -> 
             continue
         kept = slice(None, len(signal) - level)
         number, certain = read_stripes(signal[kept, at], doubt[kept, at], plan.code)
-        certain &= number < stripe_count(plan.size[axis], plan.stripe << level)
+        certain &= number < stripe_count(plan.size[axis], plan.stripe * 2**level)
         reading.index[at], reading.left_out[at] = number, np.where(certain, level, NONE)
         edges = edge_distances(number, signal[kept, at], relative[kept, at], plan.code)
         for name in ("way", "noise", "kind", "inside"):
@@ -109,8 +111,21 @@ def bit_amplitudes(signal: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def coarse_coordinate(reading: StripeReading, plan: StackPlan, axis: Axis) -> NDArray[np.float32]:
-    """Return the middles of the stripes, pattern pixels; NaN = not known."""
-    return _coordinate(reading, np.float32(0.5), plan, axis)
+    """Return the middles of the stripes, pattern pixels; NaN = not known.
+
+    Of stripes that are fringes, the edges near which a pixel lies: there its fringe may be the
+    neighbour's, which its phase tells.
+    """
+    place = thirds(reading.way) if plan.fringe_is_stripe else np.float32(0.5)
+    return _coordinate(reading, place, plan, axis)
+
+
+def thirds(way: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return 0 near a stripe's lower edge, 1 near its upper one, a half between them.
+
+    Near is a pixel whose bit at that edge has turned half as far as the one at the other edge.
+    """
+    return np.float32(0.5) * (way > 1 / 3) + np.float32(0.5) * (way > 2 / 3)
 
 
 def fine_coordinate(
@@ -127,10 +142,10 @@ def fine_coordinate(
         edges = EdgeDistances(reading.way[at], reading.noise[at], reading.kind[at],
                               reading.inside[at])  # fmt: skip
         place[at], share = place_within(edges)
-        last = stripe_count(plan.size[axis], plan.stripe << level) - 1
+        last = stripe_count(plan.size[axis], plan.stripe * 2**level) - 1
         # Where the pattern ends, light from beyond it is missing in the blur.
         border = np.minimum(reading.index[at], last - reading.index[at]) < BORDER
-        spread[at] = np.hypot(share, border * ANYWHERE) * (plan.stripe << level)
+        spread[at] = np.hypot(share, border * ANYWHERE) * (plan.stripe * 2**level)
     return _coordinate(reading, place, plan, axis), spread
 
 
@@ -139,8 +154,15 @@ def _coordinate(
 ) -> NDArray[np.float32]:
     left_out = np.where(reading.known, reading.left_out, np.uint8(0)).astype(np.int32)
     # In place and in 32 bits: these arrays are as large as the image.
-    q = place + reading.index.astype(np.float32)
-    q *= np.ldexp(np.float32(plan.stripe), left_out)
+    wide = np.ldexp(np.float32(plan.stripe), left_out)
+    q = reading.index.astype(np.float32)
+    if plan.stripe % 1:
+        # Stripes begin at whole pixels.
+        begin, end = np.ceil(q * wide - BEGIN), np.ceil((q + 1) * wide - BEGIN)
+        q = begin + place * (end - begin)
+    else:
+        q += place
+        q *= wide
     q -= np.float32(0.5)
     # The last stripe may be cut off by the pattern's end.
     np.minimum(q, np.float32(plan.size[axis] - 0.5), out=q)

@@ -20,7 +20,8 @@ from mitsuba_endo.decoding.conventions import (
 )
 from mitsuba_endo.decoding.gray_code import Code
 from mitsuba_endo.decoding.phase_shift import PhaseConvention
-from mitsuba_endo.decoding.plan import STEPS, STRIPES, StackPlan, possible_plans
+from mitsuba_endo.decoding.plan import STEPS, STRIPES, StackPlan
+from mitsuba_endo.decoding.possible_plans import possible_plans
 from mitsuba_endo.decoding.stack import Stack, decode_stack
 from mitsuba_endo.decoding.stack_patterns import patterns
 from mitsuba_endo.decoding.stack_reading import StackReading, StackRequest, find_reading
@@ -254,8 +255,8 @@ def test_own_convention():
 
 def test_plans_by_their_number_of_images():
     """Oracle: by hand: 2 x 9 bits, two references; seven and seven with two sets of four steps."""
-    assert {plan.stripe for plan in possible_plans(20, 480, 384, kind="gray")} == {1, 16}
-    phases = possible_plans(24, 480, 384, kind="gray+phase", stripe=4)
+    assert {plan.stripe for plan in possible_plans(20, 480, 384, kind="gray").plans} == {1, 16}
+    phases = possible_plans(24, 480, 384, kind="gray+phase", stripe=4).plans
     assert [(plan.steps, plan.reference) for plan in phases] == [(4, True), (5, False)]
     with pytest.raises(InputError, match="25 images, but such patterns have 24, 26"):
         possible_plans(25, 61, 44, kind="gray", inverse=True)
