@@ -26,6 +26,8 @@ CLEAR = 0.05
 """Least difference between both sides' shares of rays that meet the surface again, for one side to
 count as the inside."""
 
+FAR = 100.0
+"""Sizes of a surface from the origin, from which single precision rounds by 1e-5 of its size."""
 OFF_WALL = 1e-4
 """Of the surface's size: where a ray starts, lest it meets the face that it starts on."""
 
@@ -44,8 +46,9 @@ def load_user_mesh(scene: Scene) -> Mesh:
     source = str(scene.file)
     raw = _read(Path(source))
     mesh = Mesh(raw.vertices * MM[scene.unit], raw.faces)
+    mesh = _joined(_used(mesh))
     _check_size(mesh, source, scene.unit)
-    mesh = _joined(mesh)
+    mesh = near_origin(mesh)
     check_winding(mesh, source)
     if scene.side == "front":
         return mesh
@@ -57,6 +60,23 @@ def _read(path: Path) -> Mesh:
         return scene_mesh(path)
     surface = load_surface(path)
     return Mesh(surface.vertices, surface.faces)
+
+
+def _used(mesh: Mesh) -> Mesh:
+    """Leave out vertices that no triangle has: they may be anywhere."""
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    return Mesh(mesh.vertices[used], faces.reshape(mesh.faces.shape))
+
+
+def near_origin(mesh: Mesh) -> Mesh:
+    """Return a mesh far from the origin, as surveys and scanners store it, about the origin.
+
+    Rendering is in single precision. Cameras are placed on the surface, so nothing else moves.
+    """
+    middle, size = mesh.bounds.mean(0), float(np.linalg.norm(np.diff(mesh.bounds, axis=0)))
+    if np.linalg.norm(middle) <= FAR * size:
+        return mesh
+    return Mesh(mesh.vertices - middle, mesh.faces, mesh.uv)
 
 
 def _check_size(mesh: Mesh, source: str, unit: str) -> None:

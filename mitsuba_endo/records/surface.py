@@ -87,6 +87,8 @@ def load_surface(path: str | Path) -> SurfaceEstimate:
     """
     mesh = read_mesh(path)
     vertices, faces = np.array(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    # Vertices that no triangle has may be anywhere, also nowhere; they keep their numbers.
+    vertices[~np.isfinite(vertices).all(1)] = vertices[faces[0, 0]]
     raw = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")
     names = getattr(getattr(raw, "dtype", None), "names", None) or raw or ()  # text: a mapping
     if raw is None or STD_PROPERTY not in names:

@@ -8,6 +8,7 @@ from mitsuba_endo.dataset.run import failures
 from mitsuba_endo.dataset.scene_ranges import Scene
 from mitsuba_endo.dataset.user_mesh import load_user_mesh, note
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.records.surface import load_surface
 from mitsuba_endo.rendering.scene_surfaces import scene_mesh
 from mitsuba_endo.shapes import Mesh, make_shape
 from tests.dataset.small import make_here, small_config
@@ -145,3 +146,25 @@ def test_samples_of_a_users_tube_are_made_and_no_file_is_needed_any_more(tmp_pat
     ball(tmp_path / "t.ply")
     with pytest.raises(InputError, match="begun with another surfaces"):
         make_here(config, tmp_path / "out", 3)
+
+
+def test_a_vertex_that_no_triangle_has_may_be_nowhere(tmp_path):
+    """Oracle: the ball without it."""
+    mesh = trimesh.creation.icosphere(3, 40.0)
+    vertices = np.vstack([mesh.vertices, [[np.nan] * 3], [[9e5] * 3]])
+    trimesh.Trimesh(vertices, mesh.faces, process=False).export(tmp_path / "b.ply")
+    loaded = load_user_mesh(given(tmp_path / "b.ply", side="outside"))
+    np.testing.assert_allclose(loaded.bounds, mesh.bounds, atol=1e-4)
+    surface = load_surface(tmp_path / "b.ply")
+    assert np.isfinite(surface.vertices).all()
+    assert len(surface.vertices) == len(vertices)
+
+
+def test_far_from_the_origin(tmp_path):
+    """Oracle: the same ball about the origin; a thousand kilometres off, in double precision."""
+    mesh = trimesh.creation.icosphere(3, 40.0)
+    lines = [f"v {x + 8e8:.6f} {y - 5e8:.6f} {z:.6f}" for x, y, z in mesh.vertices]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.faces]
+    (tmp_path / "b.obj").write_text("\n".join(lines))
+    loaded = load_user_mesh(given(tmp_path / "b.obj", side="outside"))
+    np.testing.assert_allclose(np.sort(loaded.vertices, 0), np.sort(mesh.vertices, 0), atol=1e-5)
