@@ -51,7 +51,8 @@ def calibrate(
         share: entries of the sharing plan to replace, e.g. ``{"projector_pose": "shared"}``.
         map_convention: how the maps count and order coordinates, a command's ``--map-convention``.
         mask: image whose white pixels are used, for all frames, or a folder of one per frame.
-        pattern: in the images; default the coded grid.
+        pattern: in the images; default the coded grid. With ``stack``, ``gray``, ``phase`` or
+            ``gray+phase`` each folder is a stack of photographs, and makes one frame.
         refine: whether decoded coordinates are refined on their images.
         resume: folder of an earlier calibration of these frames to go on with.
         progress: called with the share of the work done and the name of the step.

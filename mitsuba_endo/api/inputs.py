@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..decoding.frame_files import frame_files
 from ..decoding.image_files import ImageFrame, full_scale, is_images, read_frames
+from ..decoding.stack_map import KINDS, stack_map
 from ..errors import InputError, NothingDecodedError, shown
 from ..records.correspondence import CorrespondenceMap, load_maps
 from ..records.map_convention import MapConvention, read_map_convention
@@ -62,7 +63,8 @@ def as_correspondences(
     Args:
         captures: of every frame.
         rig: sizes of image and pattern.
-        pattern: in the images, a command's ``--pattern``; None: the coded grid.
+        pattern: in the images, a command's ``--pattern``; None: the coded grid. With ``stack`` each
+            folder is a stack, and makes one frame.
         refine: whether decoded coordinates are refined on their images.
         map_convention: of files and arrays, a command's ``--map-convention``; records are right.
 
@@ -74,16 +76,18 @@ def as_correspondences(
     frames = [frame for k, capture in enumerate(captures) for frame in _frames(capture, k)]
     paths = [frame for frame in frames if isinstance(frame, Path)]
     images = [path for path in paths if is_images(path)]
+    size = rig.projector.width, rig.projector.height
     if images and len(images) < len(frames):
         raise InputError("maps and images are given", str(images[0]), "give one kind")
     if images:
         if map_convention:
             raise InputError("is for maps, and images are given", "map_convention", "leave it out")
+        if pattern in KINDS:
+            return [stack_map(path, size, pattern).map for path in paths]
         return _decoded(images, rig, pattern, refine)
     if pattern is not None:
         raise InputError("is for images, and maps are given", "pattern", "leave it out")
     convention = read_map_convention(map_convention)
-    size = rig.projector.width, rig.projector.height
     read = iter(load_maps(paths, convention, size))
     return [
         frame if isinstance(frame, CorrespondenceMap)

@@ -89,6 +89,14 @@ Pattern = Annotated[
     str | None,
     typer.Option(help="The pattern in the images; pattern:coded if not given.", show_default=False),
 ]
+PatternOrStack = Annotated[
+    str | None,
+    typer.Option(
+        help="The pattern in the images; pattern:coded if not given. For folders of a stack each: "
+        "stack, gray, phase or gray+phase.",
+        show_default=False,
+    ),
+]
 
 
 Live = Annotated[
@@ -118,7 +126,7 @@ def calibrate(
     mask: Mask = None,
     seed: Seed = 0,
     resume: Resume = None,
-    pattern: Pattern = None,
+    pattern: PatternOrStack = None,
     refine: Refine = True,
     live: Live = False,
     save: Save = "",
@@ -129,7 +137,8 @@ def calibrate(
     """Find projector pose, focal length and surface from correspondence maps.
 
     Images of the coded grid are decoded and refined first, as by the command decode; their maps and
-    pictures of the grids found go into the folder "decoded" of the solution.
+    pictures of the grids found go into the folder "decoded" of the solution. With --pattern stack
+    each folder is a stack of Gray code or shifted fringes, decoded as by decode-stack.
     """
     from ..litter import scratch_folder
 

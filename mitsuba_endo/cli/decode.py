@@ -171,10 +171,18 @@ def decode_images(
             no pattern found in any image, or as :func:`decode_into`.
     """
     from ..decoding.image_files import is_images
+    from ..decoding.stack_map import KINDS
     from ..errors import InputError
     from ..records.rig import load_rig
+    from .stack_frames import decode_stacks
 
     images = [path for path in paths if is_images(path)]
+    if pattern in KINDS and images:
+        if not refine:
+            raise InputError("is for images of the coded grid", "--no-refine", "leave it out")
+        if map_convention:
+            raise InputError("is for maps", "--map-convention", "leave it out")
+        return decode_stacks(paths, rig_file, pattern, aside, output)
     if not images:
         if pattern is not None:
             raise InputError("is for images, and maps are given", "--pattern", "leave it out")
@@ -203,7 +211,8 @@ def refuse_nothing(found: Sequence[Summary]) -> None:
     if found and all(one.reason for one in found):
         first = found[0]
         where = first.name if len(found) == 1 else f"{first.name} and {len(found) - 1} more"
-        raise NothingDecodedError(first.reason, where, "check the pattern, light and focus")
+        todo = "check the pattern, light and focus; photographs of a stack take --pattern stack"
+        raise NothingDecodedError(first.reason, where, todo)
 
 
 def map_path(folder: Path, frame: str) -> Path:

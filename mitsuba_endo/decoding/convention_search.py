@@ -255,12 +255,7 @@ def _middles(
 def _best(found: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypothesis:
     ranked = sorted(found, key=lambda one: -one.map.share)
     if not ranked or ranked[0].map.share < LEAST_SHARE:
-        share = f"; the best makes sense of {100 * ranked[0].map.share:.0f} %" if ranked else ""
-        raise InputError(
-            f"none of {tried} orders and codes fits the images{share}", "stack",
-            f"check the pattern's size and its options, and the focus, or state {OPTION}"
-            + (f"; {ONE_DIRECTION}" if one_direction else ""),
-        )  # fmt: skip
+        raise _nothing_fits(ranked, tried, one_direction)
     best = ranked[0]
     for other in ranked[1:]:
         if other.map.share >= ALIKE * best.map.share and not _same_map(best, other):
@@ -270,6 +265,21 @@ def _best(found: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypot
             )  # fmt: skip
     # Of those that are the same, the commonest.
     return next(one for one in found if one.map.share >= SAME * best.map.share)
+
+
+def _nothing_fits(ranked: Sequence[Hypothesis], tried: int, one_direction: bool) -> InputError:
+    turned = max(ranked, key=lambda one: one.map.mirrored, default=None)
+    if turned and turned.map.mirrored >= LEAST_SHARE:
+        return InputError(
+            f"what the images show is mirrored, if they are {turned.describe()}", "stack",
+            "turn off mirroring in the camera or the projector, or state what they are",
+        )  # fmt: skip
+    share = f"; the best makes sense of {100 * ranked[0].map.share:.0f} %" if ranked else ""
+    return InputError(
+        f"none of {tried} orders and codes fits the images{share}", "stack",
+        (f"{ONE_DIRECTION}; else " if one_direction else "")
+        + f"check the pattern's size and its options, and the focus, or state {OPTION}",
+    )  # fmt: skip
 
 
 def _same_map(one: Hypothesis, other: Hypothesis) -> bool:

@@ -95,13 +95,20 @@ class SampleMap:
     """(T, h, w)"""
     share: float
     """Of the lit samples that are smooth and not mirrored, at the best lag."""
+    mirrored: float
+    """Of those that are smooth and mirrored."""
 
 
 def joined(axes: Sequence[AxisMap], lit: NDArray[np.bool_]) -> SampleMap:
     x, y = axes
-    shares = []
+    shares, mirrored = [], []
     for lag in x.steps.keys() & y.steps.keys():
         a, b = x.steps[lag], y.steps[lag]
         upright = a.by_x * b.by_y - a.by_y * b.by_x > 0
-        shares.append(float((a.smooth & b.smooth & upright)[_middle(lit, lag)].mean()))
-    return SampleMap(np.stack([x.q, y.q], -1), np.maximum(x.width, y.width), _second_best(shares))
+        smooth = a.smooth & b.smooth
+        shares.append(float((smooth & upright)[_middle(lit, lag)].mean()))
+        mirrored.append(float((smooth & ~upright)[_middle(lit, lag)].mean()))
+    return SampleMap(
+        np.stack([x.q, y.q], -1), np.maximum(x.width, y.width), _second_best(shares),
+        _second_best(mirrored),
+    )  # fmt: skip

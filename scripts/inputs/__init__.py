@@ -1,0 +1,1 @@
+"""Inputs as other people bring them, each with what it should come to."""
