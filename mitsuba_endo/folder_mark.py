@@ -27,6 +27,7 @@ class Kind(StrEnum):
     SAMPLE = "a sample of a dataset"
     SCENE = "a Mitsuba scene"
     SEQUENCE = "a tracked sequence"
+    UNFINISHED = "an unfinished sequence"
     VIEWS = "views for training"
 
 

@@ -13,8 +13,13 @@ from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, 
 from .decode import Refine
 
 if TYPE_CHECKING:
+    from ..records.rig import Rig
     from ..records.trajectory import FrameRow
+    from ..sequence.inputs import Feed
+    from ..sequence.options import SequenceOptions
     from ..sequence.outcome import SequenceResult
+    from ..sequence.resume import Past
+    from ..show.unfinished_folder import UnfinishedFolder
 
 Frames = Annotated[
     list[Path],
@@ -32,6 +37,13 @@ Voxel = Annotated[
     float | None,
     typer.Option(min=1e-6, help="Side of the map's voxels, mm; chosen, if not given."),
 ]
+Resume = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="Go on with a stopped sequence, or with new frames after those of a finished one.",
+    ),
+]
 
 
 def sequence(
@@ -44,6 +56,7 @@ def sequence(
     voxel: Voxel = None,
     pattern: Pattern = None,
     refine: Refine = True,
+    resume: Resume = None,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -51,38 +64,66 @@ def sequence(
     """Track camera and projector through a video, and fuse what all frames see into one surface.
 
     The first frames are calibrated; every further one is placed against the map that grows from
-    them. A frame that fits nowhere is lost, and named. Ctrl-C writes what there is.
+    them. A frame that fits nowhere is lost, and named. Ctrl-C writes what there is; --resume goes
+    on from there, also with new frames.
     """
     with session(quiet, as_json, debug) as output:
-        from ..folder_mark import Kind
-        from ..outputs import prepare_folder
         from ..records.rig import read_rig
         from ..sequence.inputs import Chosen, frames_of
         from ..sequence.options import SequenceOptions
-        from ..show.sequence_folder import write_sequence_folder
+        from ..sequence.resume import Decoding, load_state
+        from ..show.unfinished_folder import UnfinishedFolder
 
-        prepare_folder(out, Kind.SEQUENCE, [*frames, rig])
+        _prepare(out, resume, [*frames, rig])
         record, notes = read_rig(rig)
         if notes:
             output.print(*notes)
+        past = None if resume is None else load_state(resume)
         chosen = Chosen(start, end, stride)
-        incoming, count = frames_of(frames, record, chosen, pattern, refine=refine)
-        with _progress(output, count) as (say, on_frame):
-            say("Starting Mitsuba")
-            from .. import backend
-
-            backend.use()
-            from ..sequence.outcome import outcome_of
-            from ..sequence.run import run_sequence
-
-            say("Calibrating the first frames")
-            options = SequenceOptions(voxel=voxel)
-            recorded = run_sequence(incoming, record, options, on_frame)
-            say("Writing the folder")
-            result = outcome_of(recorded, options.vertices)
-            write_sequence_folder(out, result)
+        feed = frames_of(frames, record, chosen, pattern, refine=refine, past=past)
+        keeper = UnfinishedFolder(out, feed.marks, Decoding(pattern, refine))
+        options = SequenceOptions(voxel=voxel)
+        result = _track(feed, record, options, past, keeper, out, output)
         _report(result, out, output)
         raise typer.Exit(_exit_code(result))
+
+
+def _prepare(out: Path, resume: Path | None, inputs: list[Path]) -> None:
+    """Refuse, before any work, folders that could not be written."""
+    from ..folder_mark import Kind
+    from ..outputs import prepare_folder
+    from ..show.unfinished_folder import check_unfinished
+
+    prepare_folder(out, Kind.SEQUENCE, inputs)
+    check_unfinished(out, resume)
+
+
+def _track(
+    feed: "Feed",
+    rig: "Rig",
+    options: "SequenceOptions",
+    past: "Past | None",
+    keeper: "UnfinishedFolder",
+    out: Path,
+    output: Session,
+) -> "SequenceResult":
+    """Go through the frames with a line for each, write the folder and return what was found."""
+    with _progress(output, feed.count) as (say, on_frame):
+        say("Starting Mitsuba")
+        from .. import backend
+
+        backend.use()
+        from ..sequence.outcome import outcome_of
+        from ..sequence.run import run_sequence
+        from ..show.sequence_folder import write_sequence_folder
+
+        say("Calibrating the first frames" if past is None else "Passing over frames seen before")
+        run = past and past.go_on(rig, options, on_frame)
+        recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keeper)
+        say("Writing the folder")
+        result = outcome_of(recorded, options.vertices)
+        write_sequence_folder(out, result, keeper)
+    return result
 
 
 @contextlib.contextmanager

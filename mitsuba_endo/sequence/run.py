@@ -1,8 +1,9 @@
 """Through a sequence, frame by frame."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -10,12 +11,14 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
+from ..interrupts import uninterrupted
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.trajectory import FrameRow
 from .bootstrap import Beginning, begin, check_plan
 from .epipolar_focal import FocalSum, focal_of, told_of_focal
 from .frames import Incoming, Unread, check_size, shortage
+from .keeper import Keeper
 from .kept_maps import KeptMaps
 from .options import SequenceOptions
 from .part import Part, Tracked
@@ -70,8 +73,27 @@ class Run:
         """Frames in a row that were lost although they show enough."""
         self._names: set[str] = set()
 
+    @classmethod
+    def resumed(cls, state: Mapping[str, Any], on_frame: OnFrame | None = None) -> "Run":
+        """Return the run that :meth:`state` was taken of, ready for the next frame."""
+        run = cls.__new__(cls)
+        vars(run).update(state)
+        run._on_frame = on_frame or (lambda _row: None)
+        run.recorded.interrupted = False
+        run._drain()
+        return run
+
+    @property
+    def taken(self) -> int:
+        """Frames that were recorded or wait to be."""
+        return len(self.recorded.rows) + len(self._waiting)
+
+    def state(self) -> dict[str, Any]:
+        """Return all that the next frames depend on, as it is now."""
+        return {name: value for name, value in vars(self).items() if name != "_on_frame"}
+
     def add(self, frame: Incoming) -> None:
-        """Take the next frame.
+        """Take the next frame. Ctrl-C is felt between frames, never in the middle of one.
 
         Raises:
             InputError: its size is not the rig's, its name came before, or the first frames tell
@@ -79,13 +101,13 @@ class Run:
         """
         if frame.name in self._names:
             raise InputError("two frames have this name", frame.name, "rename one file")
-        self._names.add(frame.name)
         view = self._viewed(frame)
+        with uninterrupted():
+            self._names.add(frame.name)
+            self._waiting.append((view, frame))
         if self.recorded.beginning is not None:
-            self._record(view, frame)
-            return
-        self._waiting.append((view, frame))
-        if sum(isinstance(v, ThinnedMap) for v, _ in self._waiting) >= self._options.first:
+            self._drain()
+        elif sum(isinstance(v, ThinnedMap) for v, _ in self._waiting) >= self._options.first:
             self._begin()
 
     def end(self) -> Recorded:
@@ -115,14 +137,18 @@ class Run:
         ]
         _check_enough([v for v, _ in self._waiting])
         beginning = begin(maps, views, self.recorded.rig, self._options)
-        self.recorded.beginning = beginning
         self.recorded.seconds["beginning"] = time.perf_counter() - began
-        waiting, self._waiting = self._waiting, []
-        reached = False
-        for view, frame in waiting:
-            reached = reached or view is views[beginning.first]
-            early = isinstance(view, ThinnedMap) and not reached
-            self._record(Unread(view.name, EARLY) if early else view, frame)
+        self._waiting = _without_early(self._waiting, views[beginning.first])
+        self.recorded.beginning = beginning
+        self._drain()
+
+    def _drain(self) -> None:
+        """Record the frames that wait, each one wholly or not at all."""
+        while self._waiting and self.recorded.beginning is not None:
+            with uninterrupted():
+                self._record(*self._waiting[0])
+                del self._waiting[0]
+            self._on_frame(self.recorded.rows[-1])
 
     def _record(self, view: Unread | ThinnedMap, frame: Incoming) -> None:
         """Place a frame and keep what is known of it."""
@@ -136,7 +162,6 @@ class Run:
         if row.keyframe and isinstance(frame, CorrespondenceMap):
             self.recorded.kept[part].offer(number, frame)
         self.recorded.rows.append(row)
-        self._on_frame(row)
 
     def _placed(self, number: int, view: ThinnedMap) -> Tracked | str:
         parts, beginning = self.recorded.parts, self.recorded.beginning
@@ -178,6 +203,19 @@ class Run:
         self._missed = 0
 
 
+_Waiting = list[tuple[Unread | ThinnedMap, Incoming]]
+
+
+def _without_early(waiting: _Waiting, first: ThinnedMap) -> _Waiting:
+    """Return the frames with those before the first one to be placed marked as lost."""
+    at = next(k for k, (view, _) in enumerate(waiting) if view is first)
+    early = [
+        (Unread(view.name, EARLY) if isinstance(view, ThinnedMap) else view, frame)
+        for view, frame in waiting[:at]
+    ]
+    return early + waiting[at:]
+
+
 def _row(row: FrameRow, found: Tracked) -> FrameRow:
     std, placement = np.sqrt(np.diag(found.covariance)), found.placement
     row = replace(
@@ -210,6 +248,9 @@ def run_sequence(
     rig: Rig,
     options: SequenceOptions | None = None,
     on_frame: OnFrame | None = None,
+    *,
+    run: Run | None = None,
+    keeper: Keeper | None = None,
 ) -> Recorded:
     """Track all frames of a sequence.
 
@@ -221,6 +262,8 @@ def run_sequence(
         rig: what is known.
         options: how to go through them.
         on_frame: called with every frame once it is placed or lost.
+        run: to go on with, after :meth:`Run.resumed`; it has its own rig, options, ``on_frame``.
+        keeper: told of every frame.
 
     Returns:
         Poses and maps, the unit of length of the rig's scale; the world is the first camera.
@@ -229,14 +272,19 @@ def run_sequence(
         InputError: frames or rig that cannot be used; says what to do.
         KeyboardInterrupt: stopped before the first frames were calibrated.
     """
-    run = Run(rig, options or SequenceOptions(), on_frame)
+    run = run or Run(rig, options or SequenceOptions(), on_frame)
     # One thread: the matrices are too small for two, which then wait for each other.
     with threadpool_limits(1, "blas"):
         try:
             for frame in frames:
                 run.add(frame)
+                if keeper is not None:
+                    keeper.after_frame(run)
         except KeyboardInterrupt:
-            if run.recorded.beginning is None:
+            if not run.recorded.parts:
                 raise
             run.recorded.interrupted = True
-        return run.end()
+        recorded = run.end()
+        if keeper is not None:
+            keeper.at_end(run)
+        return recorded

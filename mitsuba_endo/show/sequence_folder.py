@@ -14,13 +14,21 @@ from ..records.trajectory import save_frames
 from ..sequence.outcome import SequenceResult
 from .solution_folder import save_rig, write_solution_folder
 from .trajectory_files import FRAMES, save_trajectories
+from .unfinished_folder import UnfinishedFolder
 
 KEYFRAMES = "keyframes"
 """A solution folder, which ``report``, ``view``, ``evaluate`` and ``export`` read."""
 
 
-def write_sequence_folder(path: str | Path, result: SequenceResult) -> None:
+def write_sequence_folder(
+    path: str | Path, result: SequenceResult, unfinished: UnfinishedFolder | None = None
+) -> None:
     """Write everything that a sequence found, all of it or nothing.
+
+    Args:
+        path: the folder.
+        result: what was found.
+        unfinished: what was saved on the way: the state moves into the folder.
 
     =========================  ====================================================================
     mesh.ply                   the surface in the first camera's frame; ``frames_0`` says for each
@@ -31,6 +39,7 @@ def write_sequence_folder(path: str | Path, result: SequenceResult) -> None:
     solution.json              focal length, verdict, lost frames, and the keyframes' poses
     rig.yaml                   the rig with all defaults filled in
     keyframes/                 a solution folder with the maps of some keyframes
+    state.npz                  from which ``sequence --resume`` goes on
     =========================  ====================================================================
 
     Where the sequence falls into parts, these are the part with the most frames; the mesh and the
@@ -52,6 +61,10 @@ def write_sequence_folder(path: str | Path, result: SequenceResult) -> None:
             solution = solution.model_copy(update={"surface": "mesh.ply"})
         save_solution(folder / "solution.json", solution)
         save_rig(folder / "rig.yaml", result.rig)
+        if unfinished is not None:
+            unfinished.take_state(folder)
+    if unfinished is not None:
+        unfinished.remove()
 
 
 def save_mesh(path: str | Path, mesh: FusedMesh) -> None:

@@ -1,0 +1,109 @@
+"""A sequence's state on disk, from which it goes on as if it had not been stopped."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..reading.regular import is_file
+from ..records.object_file import load_objects, save_objects
+from ..records.rig import Rig
+from .options import SequenceOptions
+from .run import OnFrame, Run
+
+FILE = "state.npz"
+SUFFIX = ".unfinished"
+"""Of the folder, beside the one that is to be written, that holds the state meanwhile."""
+_WHAT = "state of a sequence of this version"
+_TODO = "go through the sequence anew without --resume"
+
+
+@dataclass(frozen=True, eq=False)
+class Decoding:
+    """How maps come from images; the same for all frames of a sequence."""
+
+    pattern: str | None = None
+    refine: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """What an earlier run left."""
+
+    state: dict[str, Any]
+    marks: list[str]
+    """What tells each of its frames from others, see :class:`.inputs.Feed`."""
+    decoding: Decoding
+    where: str
+
+    def go_on(self, rig: Rig, options: SequenceOptions, on_frame: OnFrame | None = None) -> Run:
+        """Return the run, ready for the frame after its last.
+
+        Raises:
+            InputError: it was of another rig, or with other options.
+        """
+        before: SequenceOptions = replace(self.state["_options"], vertices=options.vertices)
+        if self.state["recorded"].rig != rig:
+            raise self._differs("was of another rig", "give the same rig")
+        for field in fields(options):
+            was, is_ = getattr(before, field.name), getattr(options, field.name)
+            if was != is_:
+                raise self._differs(f"was with {field.name} {was}, not {is_}", f"give {was} again")
+        return Run.resumed(self.state | {"_options": options}, on_frame)
+
+    def check_decoding(self, decoding: Decoding) -> None:
+        """Refuse another way from images to maps.
+
+        Raises:
+            InputError: names the option.
+        """
+        for name in ("pattern", "refine"):
+            was, is_ = getattr(self.decoding, name), getattr(decoding, name)
+            if was != is_:
+                raise self._differs(f"was with {name} {was}, not {is_}", "give the same option")
+
+    def _differs(self, how: str, todo: str) -> InputError:
+        return InputError(f"the sequence to go on with {how}", self.where, f"{todo} or start anew")
+
+
+def save_state(path: str | Path, run: Run, marks: Sequence[str], decoding: Decoding) -> None:
+    """Write the state of a run.
+
+    Args:
+        path: the file.
+        run: between two frames.
+        marks: of its frames so far.
+        decoding: how they were decoded.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    save_objects(path, {"state": run.state(), "marks": list(marks), "decoding": decoding})
+
+
+def load_state(folder: str | Path) -> Past:
+    """Read the state that lies in a sequence's folder.
+
+    Of a sequence that was killed it lies in the folder of the same name with ``.unfinished``, which
+    is the newer one where there are both.
+
+    Raises:
+        InputError: there is none, it is damaged, or another version wrote it.
+    """
+    folder = Path(folder)
+    places = [unfinished_of(folder) / FILE, folder / FILE]
+    path = next((place for place in places if is_file(place)), None)
+    if path is None:
+        raise InputError("no such file", str(places[-1]), "name the folder of an earlier sequence")
+    found = load_objects(path, _WHAT, _TODO)
+    try:
+        return Past(found["state"], found["marks"], found["decoding"], str(path))
+    except KeyError:
+        raise InputError(f"is not a readable {_WHAT}", str(path), _TODO) from None
+
+
+def unfinished_of(folder: str | Path) -> Path:
+    """Return the folder that holds the state while ``folder`` is not written yet."""
+    folder = Path(folder)
+    return folder.with_name(folder.name + SUFFIX)
