@@ -13,14 +13,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import FramePose, Result, calibrate, decode, load, render
+    from .api import FramePose, Result, TrackedSequence, calibrate, decode, load, render, track
     from .errors import InputError
     from .records.rig import Rig
 
 __version__ = "0.1.0"
 __all__ = [
-    "FramePose", "InputError", "Result", "Rig", "__version__", "calibrate", "decode", "load",
-    "render",
+    "FramePose", "InputError", "Result", "Rig", "TrackedSequence", "__version__", "calibrate",
+    "decode", "load", "render", "track",
 ]  # fmt: skip
 _HOMES = {"InputError": ".errors", "Rig": ".records.rig"}
 """Modules of the names that are not in :mod:`.api`."""

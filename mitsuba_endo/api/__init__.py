@@ -1,4 +1,4 @@
-"""The package in a few lines: :func:`calibrate`, :func:`decode`, :func:`render`, :func:`load`.
+"""The package in a few lines: :func:`calibrate`, :func:`track`, :func:`decode` and others.
 
 They take paths, arrays or records, start what they need, and give back a :class:`Result`. The
 package offers them under its own name, loaded when they are first asked for.
@@ -6,5 +6,8 @@ package offers them under its own name, loaded when they are first asked for.
 
 from .calls import calibrate, decode, load, render
 from .result import FramePose, Result
+from .tracking import TrackedSequence, track
 
-__all__ = ["FramePose", "Result", "calibrate", "decode", "load", "render"]
+__all__ = [
+    "FramePose", "Result", "TrackedSequence", "calibrate", "decode", "load", "render", "track",
+]  # fmt: skip

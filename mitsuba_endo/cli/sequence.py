@@ -44,6 +44,14 @@ Resume = Annotated[
         help="Go on with a stopped sequence, or with new frames after those of a finished one.",
     ),
 ]
+Save = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME,...",
+        help="Further files of every frame: depth, points.",
+        show_default=False,
+    ),
+]
 
 
 def sequence(
@@ -57,6 +65,7 @@ def sequence(
     pattern: Pattern = None,
     refine: Refine = True,
     resume: Resume = None,
+    save: Save = "",
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
@@ -74,6 +83,7 @@ def sequence(
         from ..sequence.resume import Decoding, load_state
         from ..show.unfinished_folder import UnfinishedFolder
 
+        kinds = _kinds(save)
         _prepare(out, resume, [*frames, rig])
         record, notes = read_rig(rig)
         if notes:
@@ -83,9 +93,18 @@ def sequence(
         feed = frames_of(frames, record, chosen, pattern, refine=refine, past=past)
         keeper = UnfinishedFolder(out, feed.marks, Decoding(pattern, refine))
         options = SequenceOptions(voxel=voxel)
-        result = _track(feed, record, options, past, keeper, out, output)
+        result = _track(feed, record, options, past, keeper, out, kinds, output)
         _report(result, out, output)
         raise typer.Exit(_exit_code(result))
+
+
+def _kinds(text: str) -> list[str]:
+    """Return the names in a list of further files, refused before any work if unknown."""
+    from ..show.sequence_views import check_kinds
+
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    check_kinds(names, "--save")
+    return names
 
 
 def _prepare(out: Path, resume: Path | None, inputs: list[Path]) -> None:
@@ -105,6 +124,7 @@ def _track(
     past: "Past | None",
     keeper: "UnfinishedFolder",
     out: Path,
+    kinds: list[str],
     output: Session,
 ) -> "SequenceResult":
     """Go through the frames with a line for each, write the folder and return what was found."""
@@ -122,7 +142,8 @@ def _track(
         recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keeper)
         say("Writing the folder")
         result = outcome_of(recorded, options.vertices)
-        write_sequence_folder(out, result, keeper)
+        write_sequence_folder(out, result, keeper.copy_state, kinds)
+        keeper.remove()
     return result
 
 

@@ -1,7 +1,7 @@
 """Frames of a sequence from files, one at a time: maps, images, folders of either, videos."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -13,7 +13,7 @@ from ..decoding.image_files import ImageFrame, images_of, is_images, read_frames
 from ..errors import InputError
 from ..reading.regular import MAP, read_bytes, regular
 from ..records.correspondence import SUFFIXES as MAPS
-from ..records.correspondence import frame_names, load_map
+from ..records.correspondence import CorrespondenceMap, frame_names, load_map
 from ..records.rig import Rig
 from ..refine.image_decoder import ImageDecoder
 from .frames import Incoming, Unread
@@ -142,6 +142,18 @@ def frames_of(
     if not used:
         raise InputError(f"of {len(maps)} frames none is left", "--start", "choose an earlier one")
     return Feed(_loaded(used), len(used), marks, where)
+
+
+def feed_of_maps(maps: Iterable[CorrespondenceMap], past: Past | None = None) -> Feed:
+    """Return maps as the frames of a sequence; ``past`` as in :func:`frames_of`."""
+
+    def arriving() -> Iterator[Arrival]:
+        for map_ in maps:
+            digest = digest_of(np.ascontiguousarray(map_.q).data)
+            yield Arrival(map_.name, digest, partial(lambda given: given, map_))
+
+    marks, where = (past.marks, past.where) if past else ([], "")
+    return Feed(arriving(), len(maps) if isinstance(maps, Sequence) else None, marks, where)
 
 
 def _inside(path: Path) -> list[Path]:

@@ -19,7 +19,7 @@ _WHAT = "state of a sequence of this version"
 _TODO = "go through the sequence anew without --resume"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Decoding:
     """How maps come from images; the same for all frames of a sequence."""
 

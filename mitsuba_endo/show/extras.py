@@ -46,26 +46,28 @@ def check_extras(names: Sequence[str], where: str) -> None:
             raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(EXTRAS)}")
 
 
+def write_depth(path: Path, points: NDArray[np.float64]) -> None:
+    """Write z of a frame's points (H, W, 3) as OpenEXR, NaN = no surface."""
+    write_exr(path, {"Z": points[..., 2].astype(np.float32)})
+
+
+def write_points(path: Path, points: NDArray[np.float64]) -> None:
+    """Write those of a frame's points (H, W, 3) that there are as a PLY."""
+    data: Any = trimesh.PointCloud(points[np.isfinite(points).all(-1)]).export(file_type="ply")
+    with atomic_path(path) as aside:
+        aside.write_bytes(data)
+
+
 @extra("depth")
 def save_depth(folder: Path, calibration: Calibration, _view: SurfaceView) -> list[str]:
     """Write ``depth*.exr``: z in each frame's camera, the solution's unit, NaN = no surface."""
-
-    def write(path: Path, points: NDArray[np.float64]) -> None:
-        write_exr(path, {"Z": points[..., 2].astype(np.float32)})
-
-    return _each_frame(folder, calibration, "depth", ".exr", write)
+    return _each_frame(folder, calibration, "depth", ".exr", write_depth)
 
 
 @extra("points")
 def save_points(folder: Path, calibration: Calibration, _view: SurfaceView) -> list[str]:
     """Write ``points*.ply``: what each frame's pixels see, in its camera's frame, one a pixel."""
-
-    def write(path: Path, points: NDArray[np.float64]) -> None:
-        data: Any = trimesh.PointCloud(points[np.isfinite(points).all(-1)]).export(file_type="ply")
-        with atomic_path(path) as aside:
-            aside.write_bytes(data)
-
-    return _each_frame(folder, calibration, "points", ".ply", write)
+    return _each_frame(folder, calibration, "points", ".ply", write_points)
 
 
 @extra("masks")

@@ -1,5 +1,6 @@
 """The folder that a sequence leaves behind."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,23 +13,28 @@ from ..records.solution import save_solution
 from ..records.surface import save_surface
 from ..records.trajectory import save_frames
 from ..sequence.outcome import SequenceResult
+from ..sequence.resume import FILE as STATE
+from .sequence_views import save_views
 from .solution_folder import save_rig, write_solution_folder
 from .trajectory_files import FRAMES, save_trajectories
-from .unfinished_folder import UnfinishedFolder
 
 KEYFRAMES = "keyframes"
 """A solution folder, which ``report``, ``view``, ``evaluate`` and ``export`` read."""
 
 
 def write_sequence_folder(
-    path: str | Path, result: SequenceResult, unfinished: UnfinishedFolder | None = None
+    path: str | Path,
+    result: SequenceResult,
+    state: Callable[[Path], None] | None = None,
+    kinds: Sequence[str] = (),
 ) -> None:
     """Write everything that a sequence found, all of it or nothing.
 
     Args:
         path: the folder.
         result: what was found.
-        unfinished: what was saved on the way: the state moves into the folder.
+        state: writes the file ``state.npz`` from which the sequence can go on.
+        kinds: of :data:`.sequence_views.KINDS`: files of every frame, in folders of these names.
 
     =========================  ====================================================================
     mesh.ply                   the surface in the first camera's frame; ``frames_0`` says for each
@@ -61,10 +67,9 @@ def write_sequence_folder(
             solution = solution.model_copy(update={"surface": "mesh.ply"})
         save_solution(folder / "solution.json", solution)
         save_rig(folder / "rig.yaml", result.rig)
-        if unfinished is not None:
-            unfinished.take_state(folder)
-    if unfinished is not None:
-        unfinished.remove()
+        if state is not None:
+            state(folder / STATE)
+        save_views(folder, result, kinds)
 
 
 def save_mesh(path: str | Path, mesh: FusedMesh) -> None:

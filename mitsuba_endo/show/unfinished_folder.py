@@ -62,9 +62,9 @@ class UnfinishedFolder:
             save_trajectories(folder, placed)
             save_rig(folder / "rig.yaml", recorded.rig)
 
-    def take_state(self, folder: Path) -> None:
-        """Copy the state into the folder of a finished sequence."""
-        shutil.copyfile(self.path / FILE, folder / FILE)
+    def copy_state(self, path: Path) -> None:
+        """Copy the state into a file."""
+        shutil.copyfile(self.path / FILE, path)
 
     def remove(self) -> None:
         """Remove the folder: what it holds is in the sequence's own."""

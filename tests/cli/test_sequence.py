@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from mitsuba_endo.png import write_png
-from mitsuba_endo.records.correspondence import write_map
+from mitsuba_endo.records.correspondence import read_exr, write_map
 from mitsuba_endo.records.solution import load_solution
 from mitsuba_endo.records.surface import load_surface
 from mitsuba_endo.records.trajectory import load_tum
@@ -94,11 +94,30 @@ def test_keyframes_are_a_solution_folder(folder: Path) -> None:
 
 def test_start_end_and_stride_choose_frames(folder: Path) -> None:
     done = run("sequence", folder / "maps", "--rig", folder / "rig.yaml", "--out",
-               folder / "some", "--start", 1, "--end", 8, "--stride", 2, "--json")  # fmt: skip
+               folder / "some", "--start", 1, "--end", 8, "--stride", 2, "--json",
+               "--save", "depth, points")  # fmt: skip
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
     assert said["frames"] == 4  # 1, 3, 5, 7
     assert [frame["name"] for frame in said["lost"]] == ["frame0005.npz"]
+    names = [f"{i:05d}_frame{k:04d}" for i, k in enumerate((1, 3, 5, 7)) if k != DARK]
+    for kind, suffix in (("depth", ".exr"), ("points", ".ply")):
+        files = sorted((folder / "some" / kind).iterdir())
+        assert [file.name for file in files] == [name + suffix for name in names]
+
+
+def test_depth_files_hold_the_scenes_depth(folder: Path) -> None:
+    """Oracle: the scene; half a millimetre is the noise of some pixels that a voxel averages."""
+    recording = withdrawal(COUNT)
+    depth = read_exr(folder / "some" / "depth" / "00003_frame0007.exr")["Z"]
+    off = depth - recording.exact(7)[1][..., 2]
+    assert np.isfinite(off).mean() > 0.5
+    assert np.nanmedian(np.abs(off)) < 0.5
+
+
+def test_unknown_files_are_refused(folder: Path) -> None:
+    line = _refused(folder, folder / "maps", "--save", "depth,masks")
+    assert "--save: 'masks' is unknown; choose from depth, points" in line
 
 
 def test_interrupt_leaves_a_usable_result(tmp_path: Path) -> None:
