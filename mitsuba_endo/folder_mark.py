@@ -26,6 +26,7 @@ class Kind(StrEnum):
     ROS = "camera files of ROS"
     SAMPLE = "a sample of a dataset"
     SCENE = "a Mitsuba scene"
+    RECORDING = "a rendered sequence"
     SEQUENCE = "a tracked sequence"
     UNFINISHED = "an unfinished sequence"
     VIEWS = "views for training"

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from mitsuba_endo import backend
+from mitsuba_endo.geometry import trajectories
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
-from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector
+from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Rig
 from mitsuba_endo.shapes import Mesh, make_shape
@@ -117,11 +117,7 @@ def withdrawal(
         fold_depth=6.0, fold_spacing=19.0, fold_width=3.0, tenia_depth=1.5, edge=1.0, seed=seed,
     )  # fmt: skip
     rng = np.random.default_rng([seed, 1])
-    sway = _wander(count, 1.5 * 6, 1.2, rng), _wander(count, 1.5 * 6, np.radians(3), rng)
-    cameras = [
-        RigidTransform(rotation_from_vector(turn), move - [0, 0, step * k])
-        for k, (move, turn) in enumerate(zip(*sway, strict=True))
-    ]
+    cameras = trajectories.withdrawal(count, rng, step)
     return Recording(
         mesh, endoscope(width, height), projector_model("direction_cosine", FOCAL, CENTRE),
         cameras, _creeping(count, rng), noise or DecoderNoise().apply, seed,
@@ -140,45 +136,13 @@ def pan(
     """Look over a stomach's wall from a circle that ends where it began."""
     mesh = make_shape("stomach", distance=55.0, angle_x=1.3, angle_y=1.2, edge=1.0, seed=seed)
     rng = np.random.default_rng([seed, 2])
-    around = 2 * np.pi * np.arange(count) / max(count - 1, 1)
-    moves = radius * np.stack([np.cos(around) - 1, np.sin(around), 0.2 * np.sin(2 * around)], -1)
-    turns = 0.01 * np.stack([-moves[:, 1], moves[:, 0], 0 * around], -1)
-    cameras = [
-        RigidTransform(rotation_from_vector(turn), move)
-        for turn, move in zip(turns, moves, strict=True)
-    ]
+    cameras = trajectories.pan(count, rng, radius)
     return Recording(
         mesh, endoscope(width, height), projector_model("direction_cosine", FOCAL, CENTRE),
         cameras, _creeping(count, rng), noise or DecoderNoise().apply, seed,
     )  # fmt: skip
 
 
-def _wander(count: int, frames: float, spread: float, rng: np.random.Generator) -> Floats:
-    """Return (count, 3) smooth random motion that begins at zero.
-
-    Args:
-        count: frames.
-        frames: over how many of them it changes.
-        spread: standard deviation.
-        rng: source of it.
-    """
-    white = rng.standard_normal((count + int(8 * frames), 3))
-    smooth = gaussian_filter1d(white, frames, axis=0)
-    smooth *= spread / smooth.std(axis=0)
-    return smooth[:count] - smooth[0]
-
-
 def _creeping(count: int, rng: np.random.Generator) -> list[RigidTransform]:
     """A projector that creeps by 2 mm and rolls by 5 degrees in 300 frames, and wobbles."""
-    along = np.cumsum(np.full(count, 2.0 / 300) + rng.normal(0, 0.01, count))
-    roll = np.cumsum(np.full(count, np.radians(5) / 300) + rng.normal(0, 0.0005, count))
-    tilt = _wander(count, 10, 0.003, rng)
-    wobble = _wander(count, 10, 0.05, rng)
-    return [
-        RigidTransform.of(
-            [tilt[k, 0], tilt[k, 1], roll[k] - roll[0]],
-            [wobble[k, 0], wobble[k, 1], along[k] - along[0]],
-        )
-        @ POSE
-        for k in range(count)
-    ]
+    return [moved @ POSE for moved in trajectories.creeping(count, rng)]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Debug, Json, Quiet, Session, session
+from .render_sequence import SequenceRequest, render_sequence
 
 if TYPE_CHECKING:
     from ..rendering.render import Capture
@@ -22,7 +23,29 @@ Set = Annotated[
     ),
 ]
 Samples = Annotated[int, typer.Option(min=1, help="Samples per pixel of the image.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the image's noise.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of noise and of random motion.")]
+Trajectory = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME_OR_TUM",
+        help="Render a sequence: withdrawal, pan, or a TUM file of the camera's poses.",
+    ),
+]
+ProjectorTrajectory = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="TUM", help="Where the projector is; else it creeps and rolls in its channel."
+    ),
+]
+Count = Annotated[int, typer.Option("--frames", min=2, help="Of a sequence.")]
+Noise = Annotated[float, typer.Option(min=0, help="Of a sequence's maps, pattern pixels.")]
+Nothing = Annotated[
+    str | None,
+    typer.Option(metavar="A:B", help="Frames of a sequence, from A to before B, show nothing."),
+]
+Photographs = Annotated[
+    bool, typer.Option("--photographs", help="Of a sequence photographs instead of maps.")
+]
 
 
 def render(
@@ -31,17 +54,31 @@ def render(
     parameters: Set = [],  # noqa: B006  typer copies it
     spp: Samples = 64,
     seed: Seed = 0,
+    trajectory: Trajectory = None,
+    projector_trajectory: ProjectorTrajectory = None,
+    frames: Count = 40,
+    noise: Noise = 0.0,
+    nothing: Nothing = None,
+    photographs: Photographs = False,
     quiet: Quiet = False,
     as_json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Render image, projector coordinates, depth, normals, masks and exact truth of a scene."""
+    """Render image, projector coordinates, depth, normals, masks and exact truth of a scene.
+
+    With --trajectory a sequence: maps or photographs that the command sequence takes, and the truth
+    of all frames that evaluate compares with.
+    """
     with session(quiet, as_json, debug) as output:
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
         from ..show.capture_folder import write_capture_folder
 
         settings = parse_settings(parameters)
+        way = SequenceRequest(trajectory, projector_trajectory, frames, noise, nothing, photographs)
+        if way.check():
+            render_sequence(scene, out, settings, way, spp, seed, output)
+            return
         # A scene or a value that is no path names no file, and is passed over.
         prepare_folder(out, Kind.CAPTURE, [scene, *settings.values()])
         capture, loaded = capture_scene(scene, settings, spp, seed, output)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ..evaluate.metrics import Metrics
+    from ..evaluate.sequence_metrics import SequenceMetrics
     from ..records.solution import Estimate, PoseEstimate, Solution
 
 
@@ -26,6 +27,25 @@ METRICS = {
 """What of :class:`Metrics` is shown, with the unit."""
 
 
+SEQUENCE_METRICS = {
+    "frames": ("frames", ""),
+    "lost": ("frames lost", ""),
+    "other_parts": ("frames in other parts", ""),
+    "ate_aligned_rms_mm": ("absolute trajectory error, aligned, RMS", "mm"),
+    "ate_aligned_max_mm": ("the same, largest", "mm"),
+    "ate_first_rms_mm": ("the same, first cameras put together, RMS", "mm"),
+    "rpe_shift_rms_mm": ("motions over 10 frames, RMS", "mm"),
+    "rpe_turn_rms_deg": ("turns over 10 frames, RMS", "deg"),
+    "last_to_first_mm": ("last frame against the first", "mm"),
+    "scale_error_percent": ("scale of the way", "%"),
+    "focal_error_percent": ("focal length", "%"),
+    "surface_rms_mm": ("surface distance, aligned, RMS", "mm"),
+    "surface_median_mm": ("surface distance, aligned, median", "mm"),
+    "completeness_percent": ("seen surface found within 1 mm", "%"),
+    "camera_intervals_percent": ("95 % intervals of camera poses that hold the truth", "%"),
+    "projector_intervals_percent": ("95 % intervals of projector poses that do", "%"),
+}
+"""What of :class:`SequenceMetrics` is shown, with the unit."""
 INTERVAL_COLUMN = "± (95 %)"
 _ROUNDING = 1e-12
 """A value below, in whatever unit, is a rounding error of double precision and shown as 0."""
@@ -142,6 +162,14 @@ def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
     for axis, value, s, is_true in lengths:
         row = numbers(value, 4), _half(s), numbers(is_true, 4), solution.units
         table.add_row(f"translation {axis}", *row)
+    return table
+
+
+def sequence_table(metrics: "SequenceMetrics") -> "Table":
+    """List a sequence's errors against the truth."""
+    table = _table("Errors against the truth", "Quantity", "Value", "Unit")
+    for key, (name, unit) in SEQUENCE_METRICS.items():
+        table.add_row(name, numbers(getattr(metrics, key), 4), unit)
     return table
 
 

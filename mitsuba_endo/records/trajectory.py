@@ -16,6 +16,8 @@ from ..reading.regular import TABLE, read_text
 
 _DIGITS = 9
 """Significant ones in files: far below any deviation."""
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+_FURTHER = ("noise_px", "misfit", "overlap", "agreement", "rms_px", "coverage", "seconds")
 _STEP = ("turn_x", "turn_y", "turn_z", "x", "y", "z")
 
 
@@ -114,13 +116,49 @@ def save_frames(path: str | Path, rows: Sequence[FrameRow]) -> None:
         writer.writerows(_cells(row) for row in rows)
 
 
+def load_frames(path: str | Path) -> list[FrameRow]:
+    """Read what :func:`save_frames` writes.
+
+    Raises:
+        InputError: missing file, or one that is no such table.
+    """
+    lines = csv.DictReader(read_text(path, TABLE).splitlines())
+    if lines.fieldnames != _heads():
+        raise InputError("is no table of frames", str(path), "make it again")
+    try:
+        return [_row(cells) for cells in lines]
+    except (TypeError, ValueError, KeyError):
+        raise InputError("is no table of frames", str(path), "make it again") from None
+
+
+def _row(cells: dict[str, str]) -> FrameRow:
+    if None in cells or None in cells.values():  # a longer or shorter line
+        raise ValueError
+
+    def numbers(prefix: str, names: Sequence[str]) -> NDArray[np.float64] | None:
+        texts = [cells[f"{prefix}_{name}"] for name in names]
+        return np.array([float(text) for text in texts]) if all(texts) else None
+
+    def pose(prefix: str) -> RigidTransform | None:
+        values = numbers(prefix, _POSE)
+        if values is None:
+            return None
+        return RigidTransform(Rotation.from_quat(values[3:]).as_matrix(), values[:3])
+
+    further = {name: float(cells[name]) if cells[name] else None for name in _FURTHER}
+    return FrameRow(
+        int(cells["number"]), cells["name"], cells["lost"], int(cells["part"]),
+        cells["keyframe"] == "1", pose("camera"), pose("projector"),
+        numbers("camera_std", _STEP), numbers("projector_std", _STEP), **further,
+    )  # fmt: skip
+
+
 def _heads() -> list[str]:
-    pose = ("x", "y", "z", "qx", "qy", "qz", "qw")
     return [
         "number", "name", "part", "keyframe", "lost",
-        *(f"camera_{p}" for p in pose), *(f"camera_std_{s}" for s in _STEP),
-        *(f"projector_{p}" for p in pose), *(f"projector_std_{s}" for s in _STEP),
-        "noise_px", "misfit", "overlap", "agreement", "rms_px", "coverage", "seconds",
+        *(f"camera_{p}" for p in _POSE), *(f"camera_std_{s}" for s in _STEP),
+        *(f"projector_{p}" for p in _POSE), *(f"projector_std_{s}" for s in _STEP),
+        *_FURTHER,
     ]  # fmt: skip
 
 

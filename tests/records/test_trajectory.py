@@ -8,7 +8,7 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.records.trajectory import FrameRow, load_tum, save_frames, save_tum
+from mitsuba_endo.records.trajectory import FrameRow, load_frames, load_tum, save_frames, save_tum
 
 POSE = RigidTransform.of([0.0, 0.0, np.pi / 2], [1.0, -2.0, 3.5])
 
@@ -58,3 +58,27 @@ def test_table_has_a_line_a_frame(tmp_path: Path) -> None:
     at = rows[0].world_from_projector
     assert at is not None
     assert at.matrix() == pytest.approx(np.eye(4))
+
+
+def test_table_reads_back(tmp_path: Path) -> None:
+    """Oracle: the rows that were written; other tables are refused."""
+    std = np.arange(1.0, 7.0)
+    rows = [
+        FrameRow(0, "a, b", world_from_camera=POSE, projector_from_camera=POSE, camera_std=std,
+                 projector_std=2 * std, keyframe=True, part=1, misfit=1.25, seconds=0.5),
+        FrameRow(1, "c", lost='it is "dark", and moved'),
+    ]  # fmt: skip
+    path = tmp_path / "frames.csv"
+    save_frames(path, rows)
+    a, b = load_frames(path)
+    assert (a.number, a.name, a.lost, a.part, a.keyframe) == (0, "a, b", "", 1, True)
+    assert a.world_from_camera is not None
+    assert a.world_from_camera.matrix() == pytest.approx(POSE.matrix(), abs=1e-8)
+    assert a.projector_std == pytest.approx(2 * std)
+    assert (a.misfit, a.overlap, a.seconds) == (1.25, None, 0.5)
+    assert (b.lost, b.world_from_camera, b.camera_std) == ('it is "dark", and moved', None, None)
+    text = path.read_text()
+    for wrong in ("", "a,b\n1,2\n", text.replace("1.25", "much"), text + "1,2,3\n"):
+        path.write_text(wrong)
+        with pytest.raises(InputError, match="is no table of frames"):
+            load_frames(path)

@@ -1,0 +1,35 @@
+"""A sequence's folder back as what evaluation and report need of it."""
+
+from pathlib import Path
+
+from ..errors import InputError
+from ..evaluate.sequence_errors import TrackedFrames
+from ..reading.regular import is_file
+from ..records.solution import load_solution
+from ..records.surface import load_surface
+from ..records.trajectory import load_frames
+from .map_names import SURFACE
+from .trajectory_files import FRAMES
+
+MESH = "mesh.ply"
+"""Of the part with the most frames."""
+
+
+def is_sequence_folder(path: str | Path) -> bool:
+    """Tell whether a folder was written by ``sequence``, not by ``calibrate``."""
+    folder = Path(path)
+    return is_file(folder / FRAMES) and not is_file(folder / SURFACE)
+
+
+def read_sequence_folder(path: str | Path) -> TrackedFrames:
+    """Read frames, solution and surface.
+
+    Raises:
+        InputError: a file is missing or damaged.
+    """
+    folder = Path(path)
+    rows = load_frames(folder / FRAMES)
+    if not any(not row.lost for row in rows):
+        raise InputError("has no frame with a pose", str(folder / FRAMES), "track it again")
+    mesh = load_surface(folder / MESH) if is_file(folder / MESH) else None
+    return TrackedFrames(load_solution(folder), rows, mesh)

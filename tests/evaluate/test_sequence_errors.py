@@ -1,0 +1,157 @@
+"""Errors of a sequence: none for the truth itself, and those put in where they were put in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mitsuba_endo.errors import InputError
+from mitsuba_endo.evaluate.sequence_errors import TrackedFrames, evaluate_sequence
+from mitsuba_endo.evaluate.sequence_metrics import SequenceMetrics
+from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.records.calibration import SurfaceEstimate
+from mitsuba_endo.records.rig import Camera
+from mitsuba_endo.records.solution import Solution
+from mitsuba_endo.records.trajectory import FrameRow
+from tests.sequences import SIZE, Recording, exact, withdrawal
+
+COUNT = 24
+STD = np.array([0.001, 0.001, 0.001, 0.1, 0.1, 0.1])
+
+
+@pytest.fixture(scope="module")
+def clean() -> Recording:
+    return withdrawal(COUNT, noise=exact)
+
+
+@pytest.fixture(scope="module")
+def truth(clean: Recording) -> Solution:
+    def fixed(value: object) -> dict[str, object]:
+        return {"value": value, "status": "fixed"}
+
+    def pose(at: RigidTransform) -> dict[str, object]:
+        return {"R": at.R.tolist(), "t": at.t.tolist(), "status": "fixed"}
+
+    projector = clean.projector
+    return Solution.model_validate({
+        "outcome": "truth", "units": "mm", "scale": "truth",
+        "camera": Camera.from_model(clean.camera),
+        "projector": {
+            "law": projector.law, "width": SIZE[0], "height": SIZE[1],
+            "focal": fixed(float(projector.focal)), "centre": fixed(list(projector.centre)),
+            "aspect": fixed(1.0), "distortion": fixed([0.0, 0.0]),
+        },
+        "frames": [
+            {"name": f"frame{k:04d}", "projector_from_camera": pose(own),
+             "world_from_camera": pose(at)}
+            for k, (own, at) in enumerate(
+                zip(clean.projector_from_camera, clean.world_from_camera, strict=True))
+        ],
+    })  # fmt: skip
+
+
+def _rows(clean: Recording) -> list[FrameRow]:
+    return [
+        FrameRow(k, f"frame{k:04d}.exr", world_from_camera=clean.world_from_camera[k],
+                 projector_from_camera=clean.projector_from_camera[k], camera_std=STD,
+                 projector_std=STD)
+        for k in range(COUNT)
+    ]  # fmt: skip
+
+
+def _compare(clean: Recording, truth: Solution, rows: list[FrameRow], **of: object):
+    mesh = SurfaceEstimate(clean.mesh.vertices.astype(float), clean.mesh.faces)
+    surface = of.pop("surface", mesh)
+    solution = truth.model_copy(update=of)
+    return evaluate_sequence(TrackedFrames(solution, rows, surface), truth, mesh)  # type: ignore[arg-type]
+
+
+def test_the_truth_has_no_errors(clean: Recording, truth: Solution) -> None:
+    """Two frames are lost; the first of them begins another world."""
+    rows = _rows(clean)
+    rows[0] = FrameRow(0, "frame0000.exr", lost="blood")
+    rows[9] = FrameRow(9, "frame0009.exr", lost="blood")
+    first = clean.world_from_camera[1].inverse()
+    moved = [
+        row if row.world_from_camera is None
+        else replace(row, world_from_camera=first @ row.world_from_camera)
+        for row in rows
+    ]  # fmt: skip
+    mesh = SurfaceEstimate(first.apply(clean.mesh.vertices.astype(float)), clean.mesh.faces)
+    found = _compare(clean, truth, moved, surface=mesh)
+    assert (found.frames, found.lost, found.other_parts) == (COUNT, 2, 0)
+    zero = [
+        found.ate_aligned_rms_mm, found.ate_first_rms_mm, found.rpe_shift_rms_mm,
+        found.last_to_first_mm, found.scale_error_percent, found.focal_error_percent,
+        found.surface_rms_mm,
+    ]  # fmt: skip
+    assert zero == pytest.approx([0] * 7, abs=1e-6)
+    assert found.completeness_percent == 100
+    assert found.camera_intervals_percent == found.projector_intervals_percent == 100
+    assert len(found.depth) >= 10
+    assert max(d.median_mm for d in found.depth if d.median_mm is not None) < 1e-3
+    assert min(d.covered_percent for d in found.depth) > 99
+
+
+def test_errors_put_in_are_found(clean: Recording, truth: Solution) -> None:
+    """Oracle: a way 2 % too long, one frame 3 mm off, half of the surface, a focal length."""
+    rows = [
+        replace(row, world_from_camera=RigidTransform(
+            row.world_from_camera.R, 1.02 * row.world_from_camera.t))
+        for row in _rows(clean) if row.world_from_camera is not None
+    ]  # fmt: skip
+    found = _compare(clean, truth, rows)
+    assert found.scale_error_percent == pytest.approx(2, abs=1e-3)
+    end = np.linalg.norm(clean.world_from_camera[-1].t)
+    assert found.last_to_first_mm == pytest.approx(0.02 * end, rel=1e-3)
+    far = np.abs(0.02 * np.array([pose.t for pose in clean.world_from_camera])) > 1.96 * 0.1
+    assert far.any()
+    assert found.camera_intervals_percent == pytest.approx(100 - 50 * far.mean())
+    assert found.projector_intervals_percent == 100
+    off = _rows(clean)
+    pose = off[5].world_from_camera
+    assert pose is not None
+    off[5] = replace(
+        off[5], world_from_camera=RigidTransform(pose.R, pose.t + np.array([0, 3.0, 0]))
+    )
+    wrong = _compare(clean, truth, off)
+    assert wrong.ate_aligned_max_mm == pytest.approx(3, abs=0.3)
+    assert wrong.ate_first_rms_mm == pytest.approx(3 / np.sqrt(COUNT), abs=1e-6)
+    half = clean.mesh.faces[clean.mesh.vertices[clean.mesh.faces[:, 0], 0] > 0]
+    part = _compare(
+        clean, truth, _rows(clean),
+        surface=SurfaceEstimate(clean.mesh.vertices.astype(float), half),
+    )  # fmt: skip
+    assert part.completeness_percent is not None
+    assert 20 < part.completeness_percent < 80
+    assert np.mean([d.covered_percent for d in part.depth]) < 80
+
+
+def test_scale_is_taken_out_where_it_is_not_known(clean: Recording, truth: Solution) -> None:
+    """Oracle: everything in units of five millimetres."""
+    rows = [
+        replace(row, world_from_camera=RigidTransform(
+            row.world_from_camera.R, row.world_from_camera.t / 5))
+        for row in _rows(clean) if row.world_from_camera is not None
+    ]  # fmt: skip
+    mesh = SurfaceEstimate(clean.mesh.vertices.astype(float) / 5, clean.mesh.faces)
+    found: SequenceMetrics = _compare(clean, truth, rows, units="baseline", surface=mesh)
+    assert found.ate_aligned_rms_mm == pytest.approx(0, abs=1e-6)
+    assert found.surface_rms_mm == pytest.approx(0, abs=1e-6)
+    assert found.last_to_first_mm == pytest.approx(0, abs=1e-6)
+    assert found.ate_first_rms_mm is None
+    assert found.scale_error_percent is None
+    assert found.camera_intervals_percent is None
+
+
+def test_the_larger_part_is_compared(clean: Recording, truth: Solution) -> None:
+    rows = [replace(row, part=int(row.number >= 18)) for row in _rows(clean)]
+    assert _compare(clean, truth, rows).other_parts == 6
+
+
+def test_another_truth_is_refused(clean: Recording, truth: Solution) -> None:
+    rows = [replace(row, name=f"other{row.number}") for row in _rows(clean)]
+    with pytest.raises(InputError, match="has no poses of the frame other0"):
+        _compare(clean, truth, rows)
+    with pytest.raises(InputError, match="2 frames with a pose"):
+        _compare(clean, truth, _rows(clean)[:2])
