@@ -9,7 +9,9 @@ from .console import Debug, Json, Quiet, session
 from .evaluate import result_files
 from .options import MaybeTruth
 
-Results = Annotated[list[Path], typer.Argument(metavar="RESULT...", help="Solution folders.")]
+Results = Annotated[
+    list[Path], typer.Argument(metavar="RESULT...", help="Solution folders, or those of sequences.")
+]
 Out = Annotated[Path, typer.Option("--out", help="HTML file to write.")]
 
 
@@ -29,7 +31,7 @@ def report(
 
 
 def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
-    """Write the report of solution folders, with the truth given or the one that lies with each.
+    """Write the report of solutions or sequences, with the truth given or that beside each.
 
     Raises:
         InputError: a file is missing or damaged, the truth is not that of its result, or ``out``
@@ -38,6 +40,7 @@ def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
     from ..errors import InputError
     from ..outputs import prepare_file
     from ..show.read_folder import read_solution_folder
+    from ..show.read_sequence import keyframes_of, tracked_of
     from ..show.report import REPORT, save_report
     from ..show.truth import find_truth
 
@@ -45,13 +48,14 @@ def write_report(results: list[Path], out: Path, truth: Path | None) -> None:
         raise InputError("a report is HTML", str(out), "give --out a name that ends in .html")
     read = [*results, *([truth] if truth else [])]
     prepare_file(out, [file for path in read for file in result_files(path)], [REPORT])
-    calibrations = [read_solution_folder(path) for path in results]
+    folders = [keyframes_of(path) for path in results]
+    calibrations = [read_solution_folder(path) for path in folders]
     truths = [
         truth or find_truth(path, calibration.solution)
-        for path, calibration in zip(results, calibrations, strict=True)
+        for path, calibration in zip(folders, calibrations, strict=True)
     ]
     named = list(zip(_names(results), calibrations, strict=True))
-    save_report(out, named, truths=truths)
+    save_report(out, named, truths=truths, tracks=[tracked_of(path) for path in results])
 
 
 def _names(results: list[Path]) -> list[str]:

@@ -11,6 +11,8 @@ from ..records.trajectory import load_frames
 from .map_names import SURFACE
 from .trajectory_files import FRAMES
 
+KEYFRAMES = "keyframes"
+"""A solution folder, which ``view``, ``evaluate`` and ``export`` read."""
 MESH = "mesh.ply"
 """Of the part with the most frames."""
 
@@ -19,6 +21,24 @@ def is_sequence_folder(path: str | Path) -> bool:
     """Tell whether a folder was written by ``sequence``, not by ``calibrate``."""
     folder = Path(path)
     return is_file(folder / FRAMES) and not is_file(folder / SURFACE)
+
+
+def keyframes_of(path: Path) -> Path:
+    """Return the solution folder in a sequence's folder; another folder as it is.
+
+    Raises:
+        InputError: the sequence has none.
+    """
+    if not is_sequence_folder(path):
+        return path
+    if not (path / KEYFRAMES).is_dir():
+        raise InputError("holds no keyframes", str(path), "it is unfinished, or has no surface")
+    return path / KEYFRAMES
+
+
+def tracked_of(path: Path) -> TrackedFrames | None:
+    """Return the frames of a sequence's folder; None of another."""
+    return read_sequence_folder(path) if is_sequence_folder(path) else None
 
 
 def read_sequence_folder(path: str | Path) -> TrackedFrames:

@@ -5,6 +5,7 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
+from ..evaluate.sequence_errors import TrackedFrames
 from ..files import atomic_path
 from ..records.calibration import Calibration
 from . import report_sections as sections
@@ -20,6 +21,7 @@ def save_report(
     results: Sequence[tuple[str, Calibration]],
     views: Sequence[SurfaceView] = (),
     truths: Sequence[Path | None] = (),
+    tracks: Sequence[TrackedFrames | None] = (),
 ) -> None:
     """Write one self-contained page: no network, no other file.
 
@@ -28,6 +30,7 @@ def save_report(
         results: name and calibration of each result; several stand side by side.
         views: of the first surface of each result, where they are at hand already.
         truths: of each result, where it is synthetic.
+        tracks: of each result, where its frames are keyframes of a sequence: all frames.
 
     Raises:
         InputError: the file cannot be written, or a truth is not that of its result.
@@ -37,20 +40,24 @@ def save_report(
     for scene, truth in zip(scenes, truths, strict=False):
         if truth is not None:
             scene.truth = load_truth(truth, scene.calibration)
-    page = _page([name for name, _ in results], scenes, views)
+    page = _page([name for name, _ in results], scenes, views, tracks or [None] * len(results))
     with atomic_path(path) as aside:
         aside.write_text(page, encoding="utf-8")
 
 
-def _page(names: list[str], scenes: list[ResultScene], views: Sequence[SurfaceView]) -> str:
+def _page(
+    names: list[str],
+    scenes: list[ResultScene],
+    views: Sequence[SurfaceView],
+    tracks: Sequence[TrackedFrames | None],
+) -> str:
     several = len(scenes) > 1
     compared = ""
     if several:
         table = sections.comparison(names, [c.calibration.solution for c in scenes])
         compared = f"<h3>Compared, with 95 % intervals</h3>{table}<p></p>"
     articles = "".join(
-        _article(i, name, scene, view)
-        for i, (name, scene, view) in enumerate(zip(names, scenes, views, strict=True))
+        _article(i, *of) for i, of in enumerate(zip(names, scenes, views, tracks, strict=True))
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -66,11 +73,13 @@ def _page(names: list[str], scenes: list[ResultScene], views: Sequence[SurfaceVi
     )
 
 
-def _article(number: int, name: str, scene: ResultScene, view: SurfaceView) -> str:
+def _article(
+    number: int, name: str, scene: ResultScene, view: SurfaceView, track: TrackedFrames | None
+) -> str:
     calibration, solution = scene.calibration, scene.calibration.solution
     return (
         f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
-        f"{sections.model(solution)}"
+        f"{sections.model(solution)}{sections.track(track)}"
         f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
         f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(scene, view, number)}"
         f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"

@@ -6,11 +6,13 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from ..evaluate.sequence_errors import TrackedFrames
 from ..records.calibration import Calibration
 from ..records.solution import Outcome, Solution
 from . import figures
 from .result_scene import ResultScene
 from .solution_values import Row, rows
+from .track_figure import track_figure
 from .view import SurfaceView, view_surface
 from .web_images import ColourBar, MapImages, MapPages, figure_image, figure_svg, map_pages
 from .web_scene import scene_canvas, view_error
@@ -35,6 +37,20 @@ def verdict(solution: Solution) -> str:
         ),
     ]
     return out + (f"<h3>Warnings</h3>{_list('notes', notes)}" if notes else "")
+
+
+def track(tracked: TrackedFrames | None) -> str:
+    """Return the poses of all frames of a sequence over time, and its lost frames."""
+    if tracked is None:
+        return ""
+    lost = [row for row in tracked.rows if row.lost]
+    named = _list("notes", [f"{row.number}, {row.name}: {row.lost}" for row in lost])
+    chart = _chart("poses over the frames", track_figure(tracked))
+    return (
+        f"<h3>All {len(tracked.rows)} frames</h3><p>Bands are 95 % intervals, grey frames lost "
+        f'({len(lost)}). What follows is of some keyframes.</p><div class="charts">{chart}</div>'
+        f"{named if lost else ''}"
+    )
 
 
 def model(solution: Solution) -> str:

@@ -14,12 +14,10 @@ from ..records.surface import save_surface
 from ..records.trajectory import save_frames
 from ..sequence.outcome import SequenceResult
 from ..sequence.resume import FILE as STATE
+from .read_sequence import KEYFRAMES
 from .sequence_views import save_views
 from .solution_folder import save_rig, write_solution_folder
 from .trajectory_files import FRAMES, save_trajectories
-
-KEYFRAMES = "keyframes"
-"""A solution folder, which ``report``, ``view``, ``evaluate`` and ``export`` read."""
 
 
 def write_sequence_folder(

@@ -92,6 +92,20 @@ def test_keyframes_are_a_solution_folder(folder: Path) -> None:
     assert json.loads((folder / "metrics.json").read_text())["focal_error_percent"] == 0
 
 
+def test_report_of_the_folder_draws_all_frames(folder: Path) -> None:
+    """Oracle: the frames that were tracked; the page is of the keyframes besides."""
+    done = run("report", folder / "out", "--out", folder / "all.html")
+    assert done.exit_code == 0, done.stderr
+    page = (folder / "all.html").read_text(encoding="utf-8")
+    assert f"All {COUNT} frames" in page
+    assert "5, frame0005.npz: the map has no finite value" in page
+    assert 'alt="poses over the frames"' in page
+    assert "grey frames lost (1)" in page
+    alone = run("report", folder / "out" / "keyframes", "--out", folder / "some.html")
+    assert alone.exit_code == 0
+    assert "poses over the frames" not in (folder / "some.html").read_text(encoding="utf-8")
+
+
 def test_start_end_and_stride_choose_frames(folder: Path) -> None:
     done = run("sequence", folder / "maps", "--rig", folder / "rig.yaml", "--out",
                folder / "some", "--start", 1, "--end", 8, "--stride", 2, "--json",
