@@ -41,6 +41,7 @@ SEQUENCE_METRICS = {
     "focal_error_percent": ("focal length", "%"),
     "surface_rms_mm": ("surface distance, aligned, RMS", "mm"),
     "surface_median_mm": ("surface distance, aligned, median", "mm"),
+    "surface_first_rms_mm": ("the same, first cameras put together, RMS", "mm"),
     "completeness_percent": ("seen surface found within 1 mm", "%"),
     "camera_intervals_percent": ("95 % intervals of camera poses that hold the truth", "%"),
     "projector_intervals_percent": ("95 % intervals of projector poses that do", "%"),

@@ -17,7 +17,7 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import INTERVAL, Solution
 from ..records.trajectory import FrameRow
-from .alignment import Similarity
+from .alignment import Similarity, align
 from .depth import RayCaster
 from .distance import distance_to_mesh
 from .poses import focal_error
@@ -86,7 +86,7 @@ def evaluate_sequence(
     in_mm = found.solution.units == "mm"
     by = trajectory_alignment(ours.found, ours.true, "rigid" if in_mm else "similarity")
     aligned = absolute_trajectory_error(ours.found, ours.true, by)
-    views = _Views(found, ours, by, truth, true_surface)
+    views = _Views(found, ours, truth, true_surface)
     lost = sum(bool(row.lost) for row in found.rows)
     focal = focal_error(found.solution.projector.focal, truth.projector.focal)
     return SequenceMetrics(
@@ -164,29 +164,34 @@ class _Views:
     """What frames see of the true surface, and of the one that was found."""
 
     def __init__(
-        self, tracked: TrackedFrames, pair: _Pair, by: Similarity, truth: Solution,
+        self, tracked: TrackedFrames, pair: _Pair, truth: Solution,
         true_surface: SurfaceEstimate | None,
     ) -> None:  # fmt: skip
-        self._pair, self._by, self._truth = pair, by, truth
+        self._pair, self._truth = pair, truth
         self._surface, self._true = tracked.surface, true_surface
+        self._in_mm = tracked.solution.units == "mm"
         step = -(-len(pair.rows) // SAMPLED)
         self._chosen = range(0, len(pair.rows), step)
         self._views: dict[int, tuple[Floats, Floats]] = {}
 
     def surface(self) -> dict[str, Any]:
-        """Return errors of the surface, aligned as the trajectory is, and its completeness."""
+        """Return errors of the surface and its completeness."""
         names = ("surface_rms_mm", "surface_median_mm", "completeness_percent")
         if self._surface is None or self._true is None:
-            return dict.fromkeys(names)
-        vertices = self._by.apply(self._pair.base.apply(self._surface.vertices))
+            return dict.fromkeys((*names, "surface_first_rms_mm"))
+        plain = self._pair.base.apply(self._surface.vertices)
+        vertices = self._by.apply(plain)
         rng = np.random.default_rng(0)
         few = rng.choice(len(vertices), min(VERTICES, len(vertices)), replace=False)
         true = self._pair.true_base.apply(self._true.vertices)
-        off = distance_to_mesh(vertices[few], true, self._true.faces)
+        off, first = (distance_to_mesh(v[few], true, self._true.faces) for v in (vertices, plain))
         seen = np.concatenate([self._seen(k, rng) for k in self._chosen])
         near = distance_to_mesh(seen, vertices, self._surface.faces) <= NEAR
         values = (_rms(off), float(np.median(off)), 100 * float(near.mean()))
-        return dict(zip(names, values, strict=True))
+        return {
+            **dict(zip(names, values, strict=True)),
+            "surface_first_rms_mm": _rms(first) if self._in_mm else None,
+        }
 
     def depth(self) -> list[FrameDepth]:
         """Return of some frames how the depth of their pixels differs."""
@@ -209,6 +214,25 @@ class _Views:
                 covered_percent=100 * len(known) / max(len(off), 1),
             ))  # fmt: skip
         return out
+
+    @cached_property
+    def _by(self) -> Similarity:
+        """What takes the surface to the true one by the cameras' whole poses.
+
+        Centres on a straight way say nothing of a rotation about it; so points before the cameras,
+        as far as the surface, take part.
+        """
+        assert self._surface is not None
+        found = self._pair.base.apply(self._surface.vertices)
+        reach = float(np.median(np.linalg.norm(found, axis=1)))
+        length = reach if self._in_mm else self._scaled(reach)
+        ours = np.concatenate([_marks(pose, reach) for pose in self._pair.found])
+        theirs = np.concatenate([_marks(pose, length) for pose in self._pair.true])
+        return align(ours, theirs, scale=not self._in_mm)
+
+    def _scaled(self, length: float) -> float:
+        by = trajectory_alignment(self._pair.found, self._pair.true, "similarity")
+        return by.scale * length
 
     def _seen(self, k: int, rng: np.random.Generator) -> Floats:
         """Return points (N, 3) of the true surface that a frame saw lit, first camera's frame."""
@@ -273,6 +297,11 @@ def _true_poses(
             )  # fmt: skip
         out.append((camera, projector))
     return out
+
+
+def _marks(pose: RigidTransform, reach: float) -> Floats:
+    """Return a camera's centre and points (4, 3) before and beside it."""
+    return pose.apply(reach * np.vstack([np.zeros(3), np.eye(3)]))
 
 
 def _rms(values: Floats) -> float:

@@ -38,8 +38,11 @@ class SequenceMetrics(Record):
     """100 (length of the way / its true length - 1), from the best similarity; signed."""
     focal_error_percent: float | None
     surface_rms_mm: float | None
-    """Distance of the found surface's vertices from the true one, aligned as the trajectory is."""
+    """Distance of the found surface's vertices from the true one, aligned by the cameras' poses,
+    rotations included: centres on a straight way leave the rotation about it open."""
     surface_median_mm: float | None
+    surface_first_rms_mm: float | None
+    """The same as ``surface_rms_mm`` with the first cameras put together instead."""
     completeness_percent: float | None
     """Share of the true surface that frames saw lit with the found one within 1 mm."""
     camera_intervals_percent: float | None

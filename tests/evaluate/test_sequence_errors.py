@@ -144,6 +144,31 @@ def test_scale_is_taken_out_where_it_is_not_known(clean: Recording, truth: Solut
     assert found.camera_intervals_percent is None
 
 
+def test_a_straight_way_leaves_no_rotation_of_the_surface_open(
+    clean: Recording, truth: Solution
+) -> None:
+    """Cameras exactly on a line, and a surface that is right: were it aligned by their centres
+    alone, any rotation about the line would do."""
+
+    def on_line(k: int) -> RigidTransform:
+        return RigidTransform(np.eye(3), np.array([1e-6 * k**2, 0, -0.5 * k]))
+
+    frames = [
+        frame.model_copy(update={"world_from_camera": frame.world_from_camera.model_copy(
+            update={"R": np.eye(3).tolist(), "t": on_line(k).t.tolist()})})
+        for k, frame in enumerate(truth.frames)
+    ]  # fmt: skip
+    rng = np.random.default_rng(0)
+    rows = [
+        replace(row, world_from_camera=on_line(row.number).perturbed(
+            np.concatenate([np.zeros(3), rng.normal(0, 0.02, 3)])))
+        for row in _rows(clean)
+    ]  # fmt: skip
+    found = _compare(clean, truth.model_copy(update={"frames": frames}), rows)
+    assert found.surface_rms_mm is not None
+    assert found.surface_rms_mm < 0.05
+
+
 def test_the_larger_part_is_compared(clean: Recording, truth: Solution) -> None:
     rows = [replace(row, part=int(row.number >= 18)) for row in _rows(clean)]
     assert _compare(clean, truth, rows).other_parts == 6
