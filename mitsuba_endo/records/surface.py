@@ -25,6 +25,7 @@ def save_surface(
     path: str | Path,
     surface: SurfaceEstimate,
     further: dict[str, NDArray[np.float32]] | None = None,
+    colours: NDArray[np.uint8] | None = None,
 ) -> None:
     """Write a binary PLY with float32 positions and, where given, ``std_0`` for each vertex.
 
@@ -32,11 +33,12 @@ def save_surface(
         path: the file.
         surface: what to write.
         further: more numbers (V,) for each vertex, by the names of their properties.
+        colours: (V, 3) RGB.
 
     Raises:
         InputError: the file cannot be written.
     """
-    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+    mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False, vertex_colors=colours)
     if surface.std is not None:
         mesh.vertex_attributes[STD_PROPERTY] = surface.std.astype(np.float32)
     for name, values in (further or {}).items():

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
@@ -11,6 +14,14 @@ LEAST_SHARE = 0.02
 """Of the pixels: a frame with fewer correspondences shows too little to be placed."""
 LEAST_CORRESPONDENCES = 200
 """Of a thinned frame, for twelve unknowns. Chosen."""
+
+
+@dataclass(frozen=True, eq=False)
+class PicturedMap(CorrespondenceMap):
+    """A map with the photograph that it was decoded from."""
+
+    picture: NDArray[np.uint8] | None = None
+    """(H, W, 3) RGB, as the camera delivered it."""
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,13 @@
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..decoding.image_files import ImageFrame, images_of, is_images, read_frames
 from ..errors import InputError
@@ -16,7 +17,7 @@ from ..records.correspondence import SUFFIXES as MAPS
 from ..records.correspondence import CorrespondenceMap, frame_names, load_map
 from ..records.rig import Rig
 from ..refine.image_decoder import ImageDecoder
-from .frames import Incoming, Unread
+from .frames import Incoming, PicturedMap, Unread
 from .resume import Decoding, Past
 
 
@@ -195,7 +196,17 @@ def _decoded(
 
 def _read(decoder: ImageDecoder, image: ImageFrame) -> Incoming:
     decoded = decoder.decode(image)
-    return Unread(image.name, decoded.grid.reason) if decoded.grid.reason else decoded.map.map
+    if decoded.grid.reason:
+        return Unread(image.name, decoded.grid.reason)
+    found = decoded.map.map
+    values = {field.name: getattr(found, field.name) for field in fields(found)}
+    return PicturedMap(**values, picture=_picture(image))
+
+
+def _picture(image: ImageFrame) -> NDArray[np.uint8]:
+    """Return (H, W, 3) RGB of 8 bits."""
+    pixels = np.broadcast_to(image.image[..., :3], (*image.image.shape[:2], 3))
+    return np.round(255 * np.clip(pixels, 0, 1)).astype(np.uint8)
 
 
 def digest_of(data: bytes | memoryview) -> str:

@@ -1,6 +1,6 @@
 """What a sequence leads to: the surface of each part, and a solution that shows keyframes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..records.trajectory import FrameRow
 from ..robust import robust_std
 from ..solve.reporting.assemble import versions
 from .bootstrap import Beginning
+from .frames import PicturedMap
 from .run import Recorded
 from .verdict import focal_warning, told
 
@@ -38,6 +39,8 @@ class SequenceResult:
     """In its world; its frames are a few keyframes, and lost frames are left out."""
     keyframes: Calibration | None
     """The same with surface and maps; None without a surface."""
+    pictures: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
+    """(H, W, 3) RGB of some keyframes, by their numbers, where images were given."""
 
     @property
     def units(self) -> Literal["mm", "baseline"]:
@@ -73,7 +76,15 @@ def outcome_of(recorded: Recorded, vertices: int | None = 100_000) -> SequenceRe
         maps = dict(recorded.kept[main].kept)
         keyframes = _calibration(solution, recorded, surface, maps)
         solution = keyframes.solution
-    return SequenceResult(recorded.rig, recorded.rows, surfaces, main, solution, keyframes)
+    return SequenceResult(
+        recorded.rig, recorded.rows, surfaces, main, solution, keyframes, _pictures(recorded)
+    )
+
+
+def _pictures(recorded: Recorded) -> dict[int, NDArray[np.uint8]]:
+    kept = [pair for maps in recorded.kept for pair in maps.kept]
+    pictured = {k: map_.picture for k, map_ in kept if isinstance(map_, PicturedMap)}
+    return {k: picture for k, picture in pictured.items() if picture is not None}
 
 
 def _surface(volume: Volume, vertices: int | None) -> FusedMesh | None:

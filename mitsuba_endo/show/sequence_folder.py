@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..files import atomic_folder
 from ..folder_mark import Kind
@@ -18,6 +19,7 @@ from .read_sequence import KEYFRAMES
 from .sequence_views import save_views
 from .solution_folder import save_rig, write_solution_folder
 from .trajectory_files import FRAMES, save_trajectories
+from .vertex_colours import vertex_colours
 
 
 def write_sequence_folder(
@@ -36,7 +38,8 @@ def write_sequence_folder(
 
     =========================  ====================================================================
     mesh.ply                   the surface in the first camera's frame; ``frames_0`` says for each
-                               vertex how many fused frames measured it
+                               vertex how many fused frames measured it; where images were given,
+                               colours are those of the photographs of some keyframes
     trajectory_camera.tum      number of the frame, world_from_camera: t x y z qx qy qz qw
     trajectory_projector.tum   likewise world_from_projector
     frames.csv                 one line a frame: poses with deviations, fit, why it was lost
@@ -56,7 +59,7 @@ def write_sequence_folder(
         for part, surface in enumerate(result.surfaces):
             suffix = "" if part == result.main else f"_part{part + 1}"
             if surface is not None:
-                save_mesh(folder / f"mesh{suffix}.ply", surface)
+                save_mesh(folder / f"mesh{suffix}.ply", surface, vertex_colours(result, part))
             save_trajectories(folder, result.of_part(part), suffix)
         save_frames(folder / FRAMES, result.rows)
         solution = result.solution
@@ -70,9 +73,9 @@ def write_sequence_folder(
         save_views(folder, result, kinds)
 
 
-def save_mesh(path: str | Path, mesh: FusedMesh) -> None:
-    """Write a fused mesh as PLY, with the number of frames for each vertex."""
+def save_mesh(path: str | Path, mesh: FusedMesh, colours: NDArray[np.uint8] | None = None) -> None:
+    """Write a fused mesh as PLY, with the number of frames and a colour for each vertex."""
     save_surface(
         path, SurfaceEstimate(mesh.vertices, mesh.faces),
-        {"frames_0": mesh.frames.astype(np.float32)},
+        {"frames_0": mesh.frames.astype(np.float32)}, colours,
     )  # fmt: skip
