@@ -1,10 +1,10 @@
-"""Watching a calibration in the viewer while it runs."""
+"""Watching a calibration or a sequence in the viewer while it runs."""
 
 import contextlib
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from .console import Session
 from .options import HOST, PORT
@@ -13,14 +13,17 @@ from .view import announce
 if TYPE_CHECKING:
     from ..records.rig import Rig
     from ..records.solution import Solution
-    from ..show.viewer import LiveView
+    from ..show.viewer import LiveSequence, LiveView
+
+
+View = TypeVar("View", "LiveView", "LiveSequence")
 
 
 @dataclass(frozen=True)
-class Watch:
-    """A viewer that is shown the iterations."""
+class Watch(Generic[View]):
+    """A viewer that is shown the iterations, or the frames."""
 
-    view: "LiveView"
+    view: View
 
     def end(self, solution: "Solution", output: Session) -> None:
         """Say how it ended; leave the viewer to who sits before it, until Ctrl-C."""
@@ -34,8 +37,8 @@ class Watch:
 
 
 @contextlib.contextmanager
-def watching(live: bool, rig: "Rig", output: Session) -> Iterator[Watch | None]:
-    """Start a viewer if ``live``, and end it with the block.
+def watching(live: bool, rig: "Rig", output: Session) -> Iterator["Watch[LiveView] | None"]:
+    """Start a viewer of a calibration if ``live``, and end it with the block.
 
     Raises:
         InputError: the viewer is not installed.
@@ -48,3 +51,18 @@ def watching(live: bool, rig: "Rig", output: Session) -> Iterator[Watch | None]:
     with running_server(HOST, PORT) as server:
         announce(server, True, output)
         yield Watch(LiveView(server, rig))
+
+
+@contextlib.contextmanager
+def watching_sequence(
+    live: bool, rig: "Rig", output: Session
+) -> Iterator["Watch[LiveSequence] | None"]:
+    """Start a viewer of a sequence, as :func:`watching`."""
+    if not live:
+        yield None
+        return
+    from ..show.viewer import LiveSequence, running_server
+
+    with running_server(HOST, PORT) as server:
+        announce(server, True, output)
+        yield Watch(LiveSequence(server, rig))

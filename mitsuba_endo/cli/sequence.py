@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,11 +11,13 @@ import typer
 from .calibrate import Pattern
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 from .decode import Refine
+from .live import watching_sequence
 
 if TYPE_CHECKING:
     from ..records.rig import Rig
     from ..records.trajectory import FrameRow
     from ..sequence.inputs import Feed
+    from ..sequence.keeper import Keeper
     from ..sequence.options import SequenceOptions
     from ..sequence.outcome import SequenceResult
     from ..sequence.resume import Past
@@ -52,6 +54,7 @@ Save = Annotated[
         show_default=False,
     ),
 ]
+Live = Annotated[bool, typer.Option("--live", help="Watch the map grow in a browser.")]
 
 
 def sequence(
@@ -65,6 +68,7 @@ def sequence(
     pattern: Pattern = None,
     refine: Refine = True,
     resume: Resume = None,
+    live: Live = False,
     save: Save = "",
     quiet: Quiet = False,
     as_json: Json = False,
@@ -93,8 +97,12 @@ def sequence(
         feed = frames_of(frames, record, chosen, pattern, refine=refine, past=past)
         keeper = UnfinishedFolder(out, feed.marks, Decoding(pattern, refine))
         options = SequenceOptions(voxel=voxel)
-        result = _track(feed, record, options, past, keeper, out, kinds, output)
-        _report(result, out, output)
+        with watching_sequence(live, record, output) as watch:
+            seen = [watch.view] if watch else []
+            result = _track(feed, record, options, past, keeper, seen, out, kinds, output)
+            _report(result, out, output)
+            if watch:
+                watch.end(result.solution, output)
         raise typer.Exit(_exit_code(result))
 
 
@@ -123,6 +131,7 @@ def _track(
     options: "SequenceOptions",
     past: "Past | None",
     keeper: "UnfinishedFolder",
+    watching: "Sequence[Keeper]",
     out: Path,
     kinds: list[str],
     output: Session,
@@ -133,13 +142,15 @@ def _track(
         from .. import backend
 
         backend.use()
+        from ..sequence.keeper import Keepers
         from ..sequence.outcome import outcome_of
         from ..sequence.run import run_sequence
         from ..show.sequence_folder import write_sequence_folder
 
         say("Calibrating the first frames" if past is None else "Passing over frames seen before")
         run = past and past.go_on(rig, options, on_frame)
-        recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keeper)
+        keepers = Keepers([keeper, *watching])
+        recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keepers)
         say("Writing the folder")
         result = outcome_of(recorded, options.vertices)
         write_sequence_folder(out, result, keeper.copy_state, kinds)

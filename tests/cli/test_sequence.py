@@ -157,6 +157,21 @@ def test_interrupt_leaves_a_usable_result(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["maps", "out", "rig.yaml"]
 
 
+def test_live_shows_it_and_ends_with_it(folder: Path) -> None:
+    """Oracle: exit code 0 without a terminal to press Ctrl-C in, and the viewer's address."""
+    pytest.importorskip("viser")
+    command = [sys.executable, "-m", "mitsuba_endo", "sequence", "maps", "--rig", "rig.yaml",
+               "--out", "live", "--end", "4", "--live"]  # fmt: skip
+    environment = {"PYTHONPATH": str(Path(__file__).parents[2]), "BROWSER": "true"}
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+        stdin=subprocess.DEVNULL, env=os.environ | environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "the viewer; it ends with Ctrl-C." in done.stdout
+    assert "4 of 4 frames were placed." in done.stdout
+
+
 def _refused(folder: Path, *arguments: object) -> str:
     """Return the one sentence with which the command refuses, and see that it left nothing."""
     out = folder / "refused"
