@@ -111,6 +111,17 @@ def test_a_projector_that_all_frames_share_stays(colon: Recording) -> None:
         assert pose.t == pytest.approx(poses[0].t, abs=1e-4)
 
 
+def test_frames_in_another_order_are_lost_or_where_they_were(colon: Recording) -> None:
+    """Oracle: the scene. The first frame begins the map; the others come from all over the way."""
+    numbers = [0, 9, 2, 16, 5, 12, 1, 20, 7, 14]
+    rows = run_sequence([colon.map(k) for k in numbers], colon.rig(), FEW).rows
+    placed = [(row, k) for row, k in zip(rows, numbers, strict=True) if not row.lost]
+    assert len(placed) >= 8
+    for row, k in placed:
+        assert row.world_from_camera is not None
+        assert np.linalg.norm(row.world_from_camera.t - colon.world_from_camera[k].t) < 0.6
+
+
 BAD = {
     "no frames": ([], "there are no frames"),
     "one frame": ([0], "use the command calibrate"),
