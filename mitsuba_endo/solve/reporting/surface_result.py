@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from ...records.calibration import FrameMaps, SurfaceEstimate
 from ..inference.covariance import shared_modes
 from ..inference.fit import Fit
-from ..inference.model_error.analysis import CORRECTION_STD
 from ..minimisers.rendered import Rendering, seen_faces
 
 
@@ -38,11 +37,9 @@ def _with_nuisance(
     """
     std = inflation * fit.uncertainty.surface_std[surface]
     modes = inflation * fit.uncertainty.surface_modes[surface]
-    doubt = None if fit.model is None else fit.model.nuisance
-    if doubt is None:
+    if fit.model is None or (doubt := fit.model.nuisance) is None:
         return std, modes
-    part = CORRECTION_STD if fit.model is not None and fit.model.corrects else 1.0
-    shift = part * doubt.surface_shifts[surface]
+    shift = fit.model.correction_std * doubt.surface_shifts[surface]
     further = np.column_stack([doubt.surface_roots[surface], shift])
     total = np.sqrt(std**2 + (further**2).sum(1))
     return total, shared_modes(np.concatenate([modes, further], 1))

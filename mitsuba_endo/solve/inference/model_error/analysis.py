@@ -42,7 +42,7 @@ chosen; on twelve photographs, whose rigs were right, they took less."""
 _PLAN_EXPLAINS = 0.75
 """Share of the structure that a plan must explain to be blamed. Of four draws of a projector that
 moves it explained 0.92 to 1, of five real captures of one that does not, half."""
-CORRECTION_STD = 0.5
+_CORRECTION_STD = 0.5
 """Standard deviation of a correction over itself: priors and first order are both rough. Chosen on
 40 draws of eight wrong models, where a third left errors of up to 3.4 stated deviations and a half
 of up to 2.8; with the correction the focal length's error was a third of that without."""
@@ -131,15 +131,18 @@ class ModelCheck:
         return self.wrong and not self.refuted_plan and self.nuisance is not None
 
     @property
+    def correction_std(self) -> float:
+        """Standard deviation of what is said of the given values' errors, over itself."""
+        return _CORRECTION_STD if self.corrects and not self.unexplained else 1.0
+
+    @property
     def added(self) -> Floats | None:
         """(G, G) what errors of the given values add to the covariance, None where nothing."""
         if self.nuisance is None:
             return None
         shifts, own = self.causes.shifts if self.wrong else [], self.nuisance.shift
-        if self.corrects:
-            shifts = [CORRECTION_STD * own, *(s - own for s in shifts)]
-        else:
-            shifts = [own, *shifts]
+        base = own if self.corrects else np.zeros_like(own)
+        shifts = [self.correction_std * own, *(s - base for s in shifts)]
         return self.nuisance.covariance + _spread(shifts)
 
 
