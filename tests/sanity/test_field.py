@@ -39,3 +39,10 @@ def test_lens_beyond_its_range():
 def test_named(folder: str, map_name: str, rig: str, kinds: list[str]):
     """Oracle: the folders' READMEs; a rig with the true centre draws nothing."""
     assert [f.kind for f in _examined(folder, map_name, rig).findings] == kinds
+
+
+def test_part_of_a_picture():
+    """Oracle: the folder's README: the coordinates lie in the second part."""
+    map_ = load_map(FIELD / "16_exr_multipart" / "m22_multipart.exr")
+    assert map_.q.shape == (180, 240, 2)
+    assert map_.valid.mean() > 0.5
