@@ -105,8 +105,7 @@ def capture_scene(
         advance(0.2, "Rendering")
         capture = render_capture(loaded, spp=spp, seed=seed, name=MAP)
     made = {"scene": scene, "parameters": dict(loaded.parameters), "spp": spp, "seed": seed}
-    truth = capture.truth.model_copy(update={"configuration": made})
-    return replace(capture, truth=truth), loaded
+    return replace(capture, truth=replace(capture.truth, configuration=made)), loaded
 
 
 def parse_settings(settings: list[str]) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """A dataset as a folder of files a sample: for people, and for the other commands."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,8 @@ from ..reading.trees import read_json
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import save_map
 from ..records.exr_files import read_exr, write_exr
+from ..records.ground_truth import save_truth
 from ..records.known_input import known_rig, save_rig
-from ..records.solution import save_solution
 from ..records.surface import load_surface, save_surface
 from . import contents
 from .contents import Arrays, Stored, numbered
@@ -70,8 +71,7 @@ class FolderStore:
             write_exr(folder / GRID, {k: v for part in grid for k, v in part.items()})
             write_exr(folder / MASKS, {name: arrays[name] for name in contents.MASKS})
             save_rig(folder / "rig.yaml", known_rig(sample.truth))
-            truth = sample.truth.model_copy(update={"surface": SURFACE if surface else None})
-            save_solution(folder / TRUTH, truth)
+            save_truth(folder / TRUTH, replace(sample.truth, surface=SURFACE if surface else None))
             if surface:
                 mesh = SurfaceEstimate(sample.mesh.vertices, sample.mesh.faces)
                 save_surface(folder / SURFACE, mesh)

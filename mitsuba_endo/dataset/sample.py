@@ -11,15 +11,8 @@ from ..decoding.grid_pattern import CodedGrid
 from ..geometry.endoscope import Endoscope
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
+from ..records.ground_truth import GroundTruth, TrueFrame
 from ..records.rig import Camera
-from ..records.solution import (
-    Estimate,
-    Frame,
-    Outcome,
-    PoseEstimate,
-    ProjectorEstimate,
-    Solution,
-)
 from ..shapes.mesh import Mesh
 from .asset_cache import AssetCache
 from .config import Config
@@ -48,7 +41,7 @@ class Sample:
     maps: TruthMaps
     mesh: Mesh
     """The surface in the camera's frame, mm."""
-    truth: Solution
+    truth: GroundTruth
     """Exact calibration."""
     description: dict[str, Any]
     """All that was drawn, as it stands in ``sample.json``."""
@@ -113,7 +106,7 @@ def _sample(
         radiance=np.minimum(picture.radiance, np.finfo(np.float16).max).astype(np.float16),
         maps=maps,
         mesh=Mesh(camera_from_world.apply(surface.mesh.vertices), surface.mesh.faces),
-        truth=_truth(endoscope, size),
+        truth=GroundTruth([TrueFrame(MAP, endoscope)], size),
         description=description,
     )
 
@@ -158,28 +151,3 @@ def _in_camera(polyp: dict[str, Any], camera_from_world: RigidTransform) -> dict
            for name in ("centre", "base")},
         "normal": camera_from_world.rotate(np.array(polyp["normal"])).tolist(),
     }  # fmt: skip
-
-
-def _truth(endoscope: Endoscope, size: tuple[int, int]) -> Solution:
-    values = _projector_values(endoscope.projector)
-    return Solution(
-        outcome=Outcome.TRUTH,
-        units="mm",
-        scale="truth",
-        camera=Camera.from_model(endoscope.camera),
-        projector=ProjectorEstimate(
-            law=endoscope.projector.law,
-            width=size[0],
-            height=size[1],
-            **{name: Estimate(value=value, status="fixed") for name, value in values.items()},
-        ),
-        frames=[
-            Frame(
-                name=MAP,
-                projector_from_camera=PoseEstimate.of(
-                    endoscope.projector_from_camera, status="fixed"
-                ),
-                world_from_camera=PoseEstimate.of(endoscope.world_from_camera, status="fixed"),
-            )
-        ],
-    )

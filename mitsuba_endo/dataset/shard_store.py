@@ -61,7 +61,7 @@ class ShardStore:
             group = file.create_group(_name(sample.index))
             for name, array in arrays.items():
                 group.create_dataset(name, data=array, **_filters(name, array))
-            group[TRUTH] = sample.truth.model_dump_json(by_alias=True)
+            group[TRUTH] = sample.truth.to_solution().model_dump_json(by_alias=True)
             sums = {name: array_digest(array) for name, array in arrays.items()}
             sums[TRUTH] = text_digest(group[TRUTH].asstr()[()])
             group[DESCRIPTION] = json.dumps({**sample.description, "sha256": sums})

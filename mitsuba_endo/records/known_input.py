@@ -6,36 +6,30 @@ import numpy as np
 import yaml
 
 from ..files import atomic_path
-from .rig import Focal, Projector, Rig, Scale
-from .solution import Solution
+from .ground_truth import GroundTruth
+from .rig import Camera, Focal, Projector, Rig, Scale
 
 
-def known_rig(truth: Solution) -> Rig:
+def known_rig(truth: GroundTruth) -> Rig:
     """Return what is known before a calibration, from the truth of a synthetic scene.
 
     Known are the camera's intrinsics and, of the projector, law, pattern size, centre, aspect and
     distortion; of the scale, the first frame's baseline. Left out is what is to be found: focal
     length and poses.
     """
-    projector = truth.projector
-    pose = truth.frames[0].projector_from_camera.to_transform()
-    model = projector.to_model()
-    if truth.camera is None or model is None or pose is None:
-        raise ValueError("a truth has a camera, a projector and a pose")
-    if projector.width is None or projector.height is None:
-        raise ValueError("a truth has the pattern's size")
+    at, (width, height) = truth.first, truth.pattern_size
     return Rig(
-        camera=truth.camera,
+        camera=Camera.from_model(at.camera),
         projector=Projector(
-            law=projector.law,
-            width=projector.width,
-            height=projector.height,
+            law=at.projector.law,
+            width=width,
+            height=height,
             focal=Focal(refine=True),
-            centre=[float(c) for c in model.centre],
-            aspect=float(model.aspect),
-            distortion=[float(k) for k in model.distortion.coefficients],
+            centre=[float(c) for c in at.projector.centre],
+            aspect=float(at.projector.aspect),
+            distortion=[float(k) for k in at.projector.distortion.coefficients],
         ),
-        scale=Scale(baseline=float(np.linalg.norm(pose.t))),
+        scale=Scale(baseline=float(np.linalg.norm(at.projector_from_camera.t))),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.transforms import RigidTransform
-from ..records.solution import Solution
+from ..records.ground_truth import GroundTruth
 from . import keys
 from .scene import LoadedScene
 from .truth import truth_of
@@ -29,7 +29,7 @@ class Capture:
     """(H, W) lit by the projector."""
     camera_mask: NDArray[np.bool_]
     """(H, W) the camera sees a surface."""
-    truth: Solution
+    truth: GroundTruth
     """Exact calibration."""
 
     def correspondences(self) -> NDArray[np.float32]:

@@ -1,43 +1,20 @@
-"""The exact calibration of a synthetic scene, in the structure of a solution."""
+"""The exact calibration of a synthetic scene."""
 
-from ..records.rig import Camera
-from ..records.solution import Estimate, Frame, Outcome, PoseEstimate, ProjectorEstimate, Solution
+from ..geometry.endoscope import Endoscope
+from ..records.ground_truth import GroundTruth, TrueFrame
 from .scene import LoadedScene
 
 
-def truth_of(loaded: LoadedScene, name: str = "map") -> Solution:
-    """Return the scene's exact values as a one-frame :class:`Solution` (units mm).
+def truth_of(loaded: LoadedScene, name: str = "map") -> GroundTruth:
+    """Return the scene's exact values, of one frame.
 
     Args:
         loaded: the scene.
         name: name of the frame.
     """
-    projector, (width, height) = loaded.projector(), loaded.pattern_size()
     world_from_camera = loaded.world_from_camera()
     projector_from_camera = loaded.world_from_projector().inverse() @ world_from_camera
-    return Solution(
-        outcome=Outcome.TRUTH,
-        units="mm",
-        scale="truth",
-        camera=Camera.from_model(loaded.camera()),
-        projector=ProjectorEstimate(
-            law=projector.law,
-            width=width,
-            height=height,
-            focal=_exact(projector.focal),
-            centre=_exact(list(projector.centre)),
-            aspect=_exact(projector.aspect),
-            distortion=_exact(list(projector.distortion.coefficients)),
-        ),
-        frames=[
-            Frame(
-                name=name,
-                projector_from_camera=PoseEstimate.of(projector_from_camera, status="fixed"),
-                world_from_camera=PoseEstimate.of(world_from_camera, status="fixed"),
-            )
-        ],
+    endoscope = Endoscope(
+        loaded.camera(), world_from_camera, loaded.projector(), projector_from_camera
     )
-
-
-def _exact(value: float | list[float]) -> Estimate:
-    return Estimate(value=value, status="fixed")
+    return GroundTruth([TrueFrame(name, endoscope)], loaded.pattern_size())

@@ -1,5 +1,6 @@
 """The folder of a synthetic capture: image, map, geometry, truth and the rig file to start from."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,8 @@ from ..png import write_png
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import save_map
 from ..records.exr_files import write_exr
+from ..records.ground_truth import save_truth
 from ..records.known_input import known_rig, save_rig
-from ..records.solution import save_solution
 from ..records.surface import save_surface
 from ..rendering.pattern_truth import coded_grid, grid_truth
 from ..rendering.render import Capture
@@ -48,7 +49,7 @@ def write_capture_folder(path: str | Path, capture: Capture, loaded: LoadedScene
         masks = {"visible": capture.visible, "camera": capture.camera_mask}
         write_exr(folder / "masks.exr", {k: v.astype(np.float32) for k, v in masks.items()})
         save_rig(folder / RIG, known_rig(capture.truth))
-        save_solution(folder / TRUTH, capture.truth.model_copy(update={"surface": SURFACE}))
+        save_truth(folder / TRUTH, replace(capture.truth, surface=SURFACE))
         save_surface(folder / SURFACE, _surface_in_camera(loaded))
         grid = coded_grid(loaded)
         if grid is not None:

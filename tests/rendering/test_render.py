@@ -20,11 +20,8 @@ def test_truth_explains_the_capture(rabbit: tuple[LoadedScene, Capture]) -> None
     """Oracle: depth along the true camera's rays, projected by the true projector in NumPy."""
     _, capture = rabbit
     truth = capture.truth
-    assert truth.camera is not None
-    camera, projector = truth.camera.to_model(), truth.projector.to_model()
-    pose = truth.frames[0].projector_from_camera.to_transform()
-    assert projector is not None
-    assert pose is not None
+    camera, projector = truth.first.camera, truth.first.projector
+    pose = truth.first.projector_from_camera
     rays = camera.rays(camera.pixel_grid())
     points = rays / rays[..., 2:] * capture.depth[..., None]
     seen = capture.camera_mask
@@ -33,7 +30,7 @@ def test_truth_explains_the_capture(rabbit: tuple[LoadedScene, Capture]) -> None
     np.testing.assert_allclose(capture.projector[seen], q, atol=2e-3)
     assert np.isnan(capture.projector[~seen]).all()
     assert truth.frames[0].name == "one"
-    assert truth.projector.focal.value == 300
+    assert projector.focal == 300
 
 
 def test_correspondences_are_those_that_are_lit(rabbit: tuple[LoadedScene, Capture]) -> None:
