@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trimesh.registration import procrustes
 
 from mitsuba_endo.evaluate.alignment import Similarity, align, align_robustly
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector
@@ -61,6 +62,21 @@ def test_weights_are_those_of_least_squares():
         step = rng.normal(size=7) * 1e-4
         other = RigidTransform(found.R, found.t).perturbed(step[:6])
         assert cost(Similarity(found.scale * np.exp(step[6]), other.R, other.t)) > cost(found)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_no_similarity_fits_better(weighted: bool):
+    """Oracle: trimesh's Procrustes, whose scale is the ratio of the two spreads and whose rotation
+    is the best for equal weights only: its sum of squares is the larger one."""
+    rng = np.random.default_rng(3)
+    source = _points(200)
+    target = source + rng.normal(size=source.shape)
+    weights = rng.uniform(0.1, 5, 200) if weighted else np.ones(200)
+    matrix, _, _ = procrustes(source, target, weights=weights, reflection=False)
+    theirs = source @ matrix[:3, :3].T + matrix[:3, 3]
+    ours = align(source, target, weights).apply(source)
+    cost = [float(np.sum(weights[:, None] * (x - target) ** 2)) for x in (ours, theirs)]
+    assert cost[0] <= cost[1] * (1 + 1e-12)
 
 
 def test_scale_alone_is_about_the_origin():

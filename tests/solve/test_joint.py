@@ -69,6 +69,31 @@ def test_paper_mode(views: Views) -> None:
         assert abs(np.median(along[:, 2])) < 0.1
 
 
+def test_order_of_the_frames(four_views: Views) -> None:
+    """Oracle: the same frames in another order, whose first is the world and the unit of length.
+
+    The focal length agrees within a fifth of its deviation, which itself is capped; the baselines,
+    over that of one frame, within a thousandth.
+    """
+    options = Options(jackknife=False)
+    order = [2, 0, 3, 1]
+    solutions = [
+        calibrate([four_views.maps[k] for k in ks], four_views.rig(), options).solution
+        for ks in (range(4), order)
+    ]
+    first, second = (s.projector.focal for s in solutions)
+    assert isinstance(first.std, float)
+    assert first.std < 2e-3 * four_views.projector.focal
+    assert second.value == pytest.approx(first.value, abs=0.2 * first.std)
+    baselines = [
+        {f.name: np.linalg.norm(f.projector_from_camera.t or 0) for f in s.frames}
+        for s in solutions
+    ]
+    for name in baselines[0]:
+        one, other = (r[name] / r[four_views.maps[0].name] for r in baselines)
+        assert other == pytest.approx(one, rel=1e-3)
+
+
 def test_configuration_b(surface: Surface) -> None:
     """Surface and projector pose shared, camera poses per frame."""
     views = look(surface, steps(3), [POSE] * 3)

@@ -1,11 +1,12 @@
 """What the sharing plan promises, whatever the order of the files: every mode with every other."""
 
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rotation_angle
+from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.block import BLOCKS
@@ -138,3 +139,41 @@ def test_every_pair_of_modes(pose: str, focal: str, centre: str, distortion: str
         else:
             assert min(steps) > 0
             assert (len(set(steps)) == 1) is (mode == "shared")
+
+
+SHARED = [name for name in BLOCKS if name != "camera_pose"]
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations(SHARED, 2)))
+def test_every_pair_of_blocks(one: str, other: str) -> None:
+    """Oracle: as above, for every two kinds of unknown in all their modes, the camera's included.
+
+    The other blocks are fixed, so a column that belongs to a third would show.
+    """
+    rig = small_rig("pinhole")
+    projector = {
+        "focal": {"value": 331.0, "refine": True},
+        "pose": {"R": POSE.R.tolist(), "t": POSE.t.tolist()},
+        "distortion": [0.01, -0.02],
+    }
+    camera = Camera.from_model(rig.camera).model_copy(update={"distortion": [0.01, -0.02]})
+    rng = np.random.default_rng(0)
+    for modes in product(BLOCKS[one].modes, BLOCKS[other].modes):
+        share = dict.fromkeys(SHARED, "fixed") | dict(zip((one, other), modes, strict=True))
+        record = rig_file(
+            rig, projector=projector, camera=camera, share={"surface": "per_frame", **share}
+        )
+        layout = make_layout(record, 3)
+        state = layout.state([np.ones(3)] * 3, {})
+        moved = layout.retract(state, rng.normal(0, 0.01, layout.columns))
+        for name, mode in share.items():
+            before = [state.at(name, k) for k in range(3)]
+            steps = [
+                np.abs(BLOCKS[name].difference(before[k], moved.at(name, k))).max()
+                for k in range(3)
+            ]
+            if mode == "fixed":
+                assert max(steps) < 1e-12, name
+            else:
+                assert min(steps) > 0, name
+                assert (len(set(steps)) == 1) is (mode == "shared"), name
