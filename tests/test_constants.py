@@ -45,6 +45,55 @@ def _commented(lines: list[str], node: ast.stmt) -> bool:
     return (above.startswith("#") and node.lineno > 1) or bool(re.search(r"#(?! fmt)", beside))
 
 
+def thresholds(source: str) -> list[float]:
+    """Numbers with a point that a function compares something with, but for 0, 1/2 and 1.
+
+    Left out are shares of chance, ``rng.random() < 0.3``, which stand beside what they choose.
+    """
+    functions = [f for f in ast.walk(ast.parse(source)) if isinstance(f, ast.FunctionDef)]
+    compared = {n for f in functions for n in ast.walk(f) if isinstance(n, ast.Compare)}
+    return [
+        number
+        for node in compared
+        if not re.search(r"\.random\(\)$", ast.unparse(node.left))
+        for side in (node.left, *node.comparators)
+        for number in _numbers(side)
+        if number not in (0.0, 0.5, 1.0)
+    ]
+
+
+def _numbers(node: ast.AST) -> list[float]:
+    """Numbers with a point in an expression; what a call takes by name is none of the measure."""
+    if isinstance(node, ast.Constant):
+        return [node.value] if type(node.value) is float else []
+    if isinstance(node, ast.keyword):
+        return []
+    return [n for child in ast.iter_child_nodes(node) for n in _numbers(child)]
+
+
+def test_no_threshold_is_hidden_in_a_function() -> None:
+    """Oracle: the functions' own comparisons; a threshold is a constant, which says what it is."""
+    hidden = {
+        path.relative_to(PACKAGE).as_posix(): found
+        for path in PACKAGE.rglob("*.py")
+        if (found := thresholds(path.read_text("utf-8")))
+    }
+    assert not hidden
+
+
+def test_a_hidden_threshold_is_found() -> None:
+    """Oracle: by hand."""
+    assert thresholds("def f(x):\n    return g(x, 0.3, h=0.7) < 2.5 * x\n") in (
+        [0.3, 2.5],
+        [2.5, 0.3],
+    )
+    assert (
+        thresholds("def f(x):\n    return x > 0.5 or x < 1.0 or x == 3 or rng.random() < 0.3\n")
+        == []
+    )
+    assert thresholds("LIMIT = 0.3\n\n\ndef f(x):\n    return x > LIMIT\n") == []
+
+
 def test_every_constant_is_explained() -> None:
     """Oracle: the modules' own statements."""
     found = {

@@ -17,6 +17,8 @@ LARGEST_POLYP = 0.6
 """Largest diameter of a polyp, as a share of the tube's radius: larger ones are drawn smaller."""
 POLYP_TRIES = 20
 """Places drawn for a polyp before it is left out."""
+FEET_APART = 1.5
+"""Least distance of two polyps over the sum of their diameters: each flattens the wall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,4 +111,4 @@ def _polyps(ranges: Polyps, colon: Colon, at: float, rng: np.random.Generator) -
 def _apart(a: Polyp, b: Polyp, radius: float) -> bool:
     """Tell whether two polyps leave room for the flattened wall around their feet."""
     around = radius * abs(np.angle(np.exp(1j * (a.angle - b.angle))))
-    return bool(np.hypot(a.along - b.along, around) > 1.5 * (a.diameter + b.diameter))
+    return bool(np.hypot(a.along - b.along, around) > FEET_APART * (a.diameter + b.diameter))

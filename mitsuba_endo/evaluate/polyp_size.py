@@ -44,6 +44,10 @@ _LEAST_HEIGHT = 3.0
 """Standard deviations of a vertex by which a polyp stands out of the wall."""
 _SIZES = (0.6, 1.0, 1.6)
 """Of the balls from which the fit starts, relative to the one that fills the outline."""
+_OFF_WALL = 2.5
+"""Robust standard deviations from the wall's plane at which a point is none of it. Chosen."""
+_CAP = 0.7
+"""Share of a polyp's height from which on its points tell where its middle is. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,7 @@ def _wall(points: Floats, rays: Floats) -> tuple[Floats, Floats]:
         middle = points[kept].mean(0)
         normal = np.linalg.svd(points[kept] - middle, full_matrices=False)[2][-1]
         off = np.abs((points - middle) @ normal)
-        kept = off <= 2.5 * robust_std(off)
+        kept = off <= _OFF_WALL * robust_std(off)
     return -normal * np.sign(np.mean(rays @ normal)), middle
 
 
@@ -170,7 +174,7 @@ def _starts(patch: _Patch) -> list[Floats]:
     """Return balls on the highest part of the outline: (R, x, y, z), wall (6), foot."""
     ball = patch.points[patch.inside]
     top = float(np.quantile(ball[:, 2], 0.98))
-    x, y = np.median(ball[ball[:, 2] >= 0.7 * top][:, :2], axis=0)
+    x, y = np.median(ball[ball[:, 2] >= _CAP * top][:, :2], axis=0)
     reach = float(np.quantile(np.hypot(ball[:, 0] - x, ball[:, 1] - y), 0.8))
     return [np.array([s * reach, x, y, top - s * reach, 0, 0, 0, 0, 0, 0, 0.1]) for s in _SIZES]
 

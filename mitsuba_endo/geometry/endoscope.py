@@ -10,6 +10,9 @@ from .cameras import CameraModel
 from .projection_models import ProjectorModel
 from .transforms import RigidTransform
 
+_ALONG_AXIS = 1e-12
+"""Sine of an angle to z that is none but for rounding, and has no axis to turn about."""
+
 
 @dataclass(frozen=True, eq=False)
 class Endoscope:
@@ -43,6 +46,6 @@ def _rotation_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     unit = axis / np.linalg.norm(axis)
     about = np.cross([0.0, 0.0, 1.0], unit)
     sine = np.linalg.norm(about)
-    if sine < 1e-12:  # along z but for rounding
+    if sine < _ALONG_AXIS:
         return np.eye(3)
     return Rotation.from_rotvec(about / sine * np.arctan2(sine, unit[2])).as_matrix()

@@ -37,6 +37,10 @@ _PATIENT = 200
 """Steps towards a minimum that is reported; valleys of weak relief take a hundred."""
 SIMILAR_COST = 1.2
 """Minima whose costs have at most this ratio are reported as a possible confusion."""
+_STEADY_SCALE = 0.02
+"""Relative change of the residuals' scale that ends its following. Chosen: far below its error."""
+_SAME_ANGLE, _SAME_FOCAL = 0.01, 0.02
+"""Radians and relative focal length within which two minima are one: steps end far below both."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,7 @@ def _redescend(
     for _ in range(4):
         scale = robust_scale(state)
         state = _descend(problem, state, data, EpipolarLoss(True, REDESCENDING * scale), iterations)
-        if abs(robust_scale(state) - scale) < 0.02 * scale:
+        if abs(robust_scale(state) - scale) < _STEADY_SCALE * scale:
             break
     return state
 
@@ -275,6 +279,6 @@ def _turned_to_front(state: EpipolarState, data: Correspondences) -> Minimum:
 
 def _same(a: EpipolarState, b: EpipolarState) -> bool:
     return (
-        same_pose(a.pose, b.pose, 0.01)
-        and abs(np.log(a.projector.focal / b.projector.focal)) < 0.02
+        same_pose(a.pose, b.pose, _SAME_ANGLE)
+        and abs(np.log(a.projector.focal / b.projector.focal)) < _SAME_FOCAL
     )

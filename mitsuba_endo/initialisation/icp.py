@@ -23,6 +23,8 @@ MAX_STEP = 0.3
 """Bound on a step's components (radians, common unit, log): few partners can ask for anything."""
 NEAR = 3.0
 """A partner is at most this many scales of the robust loss off the tangent plane."""
+FAR = 0.5
+"""Gap beyond which two points are no partners, in the unit of clouds about 1 away."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ def match(target_from_source: Similarities, source: Source, target: Level, scale
     gap = moved - points
     residual = np.einsum("bnk,bnk->bn", normals, gap) * weight
     # A camera model without a branch mask also projects points from behind: demand nearness.
-    near = np.einsum("bnk,bnk->bn", gap, gap) < 0.25
+    near = np.einsum("bnk,bnk->bn", gap, gap) < FAR**2
     alike = np.einsum("bnk,bnk->bn", normals, turned) > MIN_NORMAL_COSINE
     partner = seen & near & alike & (np.abs(residual) < NEAR * scale)
     return Match(moved, normals, turned, residual, weight, seen, partner)

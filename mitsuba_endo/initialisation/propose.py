@@ -36,6 +36,12 @@ SCORE_PX = 20.0
 """Cauchy scale of the proposals' order, pattern pixels: that at which their refinement begins."""
 _IN_RANGE = 0.99  # share of coordinates that must be possible; outliers may lie beyond
 _MIN_Z = 0.1  # of a unit direction: wider ones have no usable image on the plane z = 1
+_LIMIT_FOUND = 1.005
+"""Ratio of the ends at which the bisection for the shortest possible focal length stops."""
+DISTINCT_ANGLE, DISTINCT_FOCAL = 0.1, 0.2
+"""Radians and relative focal length within which proposals would descend to one minimum. Chosen."""
+_NO_SHIFT = 1e-6
+"""Length, distances of the plane, of a translation that says nothing of its direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +85,7 @@ def ladder(projector: ProjectorModel, width: int, data: Correspondences) -> Vect
     if reached(rungs[0]):
         return rungs
     low, high = rungs[0], rungs[-1]
-    while high > 1.005 * low:
+    while high > _LIMIT_FOUND * low:
         middle = np.sqrt(low * high)
         low, high = (low, middle) if reached(middle) else (middle, high)
     return np.sort(np.concatenate([rungs[rungs > high], high * np.array(ABOVE_LIMIT)]))
@@ -107,10 +113,14 @@ def distinct(proposals: list[Proposal], count: int) -> list[Proposal]:
     for p in proposals:
         if len(kept) == count:
             break
-        if not any(same_pose(p.pose, k.pose, 0.1) and abs(np.log(p.focal / k.focal)) < 0.2
-                   for k in kept):  # fmt: skip
+        if not any(_alike(p, k) for k in kept):
             kept.append(p)
     return kept
+
+
+def _alike(a: Proposal, b: Proposal) -> bool:
+    same = same_pose(a.pose, b.pose, DISTINCT_ANGLE)
+    return same and abs(np.log(a.focal / b.focal)) < DISTINCT_FOCAL
 
 
 def same_pose(a: RigidTransform, b: RigidTransform, angle: float) -> bool:
@@ -136,7 +146,7 @@ def planar_poses(data: Correspondences, seen: Bearings, threshold: float) -> lis
         return []
     _, rotations, translations, _ = cv2.decomposeHomographyMat(H, np.eye(3))
     return [_unit(R, t) for R, t in zip(rotations, translations, strict=True)
-            if np.linalg.norm(t) > 1e-6]  # fmt: skip
+            if np.linalg.norm(t) > _NO_SHIFT]  # fmt: skip
 
 
 def facing(

@@ -21,6 +21,8 @@ _STEP_TOLERANCE = 1e-7  # radians, and relative focal length
 _COST_TOLERANCE = 1e-7
 """Relative fall of the cost in a step, and a tenth of the predicted one, at which a descent ends.
 Chosen."""
+_HOPELESS_DAMPING = 1e8
+"""Damping, relative to the Hessian's diagonal, under which steps are too short to matter."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def minimise(
             if small:
                 break
             hessian, gradient = _normal_equations(state, data, loss, refine_focal)
-        elif small or damping > 1e8:
+        elif small or damping > _HOPELESS_DAMPING:
             break
         else:
             damping, growth = damping * growth, 2 * growth

@@ -31,6 +31,10 @@ NEAR_NODE = 0.3
 """Periods, per axis, within which the node's code is asked for."""
 BETWEEN_PX = 61
 """Side of the square over which light from wall to wall is spread, pixels: several periods."""
+UNSPOILT = 0.1
+"""Share of images without defocus and JPEG, in 16 bits."""
+WITHOUT_SPECKLE = 0.25
+"""Share of images without speckle, those included."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +89,11 @@ def random_effects(rng: np.random.Generator) -> Effects:
     """Draw what camera and laser do, from clean to heavy corruption."""
     u, heavy = rng.uniform, rng.random()
     harsh = heavy > 1 - HARSH
-    contrast = u(0.45, 0.85) if harsh else u(0, 0.85) * (heavy > 0.25)
+    contrast = u(0.45, 0.85) if harsh else u(0, 0.85) * (heavy > WITHOUT_SPECKLE)
     exposure = (0.2, 0.6) if harsh else (0.18, 1.3)
     return Effects(
         vignetting=u(0, 1.2),
-        defocus=0.0 if heavy < 0.1 else abs(rng.normal(0.5, 0.35)),
+        defocus=0.0 if heavy < UNSPOILT else abs(rng.normal(0.5, 0.35)),
         motion=u(0.5, 4) if rng.random() < 0.2 else 0.0,
         motion_angle=u(0, 3.14),
         # Rounded: the table behind each contrast is kept.
@@ -100,8 +104,10 @@ def random_effects(rng: np.random.Generator) -> Effects:
         shot=float(np.exp(u(np.log(800), np.log(30000)))),
         read_noise=u(0, 16),
         gamma=float(rng.choice([1.0, 1.8, 2.2])),
-        bits=16 if heavy < 0.1 else 8,
-        jpeg_quality=int(rng.integers(45, 97)) if heavy > 0.1 and rng.random() < 0.35 else None,
+        bits=16 if heavy < UNSPOILT else 8,
+        jpeg_quality=int(rng.integers(45, 97))
+        if heavy > UNSPOILT and rng.random() < 0.35
+        else None,
     )
 
 

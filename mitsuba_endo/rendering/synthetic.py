@@ -15,6 +15,9 @@ from .coordinates import FrameModel, Pose, distances, project_along
 from .mitsuba_modules import mi
 from .moving_mesh import MovingMesh, cast_into, vector
 
+_TOUCHES = 1e-3
+"""Share of the distance within which a ray ends at the point it was sent to, not before it."""
+
 
 @dataclass(frozen=True, eq=False)
 class ExactView:
@@ -140,4 +143,4 @@ class MeshScene:
         distance = np.linalg.norm(way, axis=1)
         met = self.cast(origin, way / distance[:, None])
         reached = np.linalg.norm(np.nan_to_num(met.points) - origin, axis=1)
-        return ~met.hit | (reached > distance * (1 - 1e-3))
+        return ~met.hit | (reached > distance * (1 - _TOUCHES))

@@ -33,6 +33,8 @@ NEAR_BORDER = 0.1
 FAR_FROM_MIDDLE = 0.25
 """Share of the image's side from its middle, from which a crop is likely. Chosen."""
 FITTING = "give that of images of just this size: scale it with the image, shift it with a crop"
+NORMALISED_FOCAL, NORMALISED_CENTRE = 10, 1.5
+"""A matrix below both is in image widths, not pixels: 10 is a field of 6 degrees."""
 
 
 def focal_units(_maps: Sequence[CorrespondenceMap], rig: Rig) -> list[Finding]:
@@ -113,7 +115,7 @@ def _finding(kind: str, what: str, todo: str = FITTING, refused: bool = False) -
 
 def _normalised(camera: Camera) -> bool:
     fx, fy, cx, cy = _entries(camera)
-    small = max(fx, fy) < 10 and max(cx, cy) < 1.5
+    small = max(fx, fy) < NORMALISED_FOCAL and max(cx, cy) < NORMALISED_CENTRE
     return small and min(cx, cy) > 0 and min(camera.width, camera.height) > 9
 
 

@@ -45,6 +45,8 @@ MENDING = {
     "or state --map-convention swapped,x-mirrored,y-upwards",
     "mirrored": "check the directions of x and y in the map, and turn off mirroring",
 }
+WIDE_STEP = 0.25
+"""Least area that two steps between cells span, cells squared: less tells no handedness."""
 
 
 def handedness(maps: Sequence[CorrespondenceMap], _rig: Rig) -> list[Finding]:
@@ -109,7 +111,7 @@ def local_jacobians(map_: CorrespondenceMap) -> NDArray[np.float64]:
     steps = np.stack([right, below], -1)
     steps = steps[np.isfinite(steps).all((-1, -2))].astype(np.float64)
     dq, dp = steps[:, :2], steps[:, 2:]
-    apart = (np.abs(np.linalg.det(dp)) > 0.25 * side * side) & (np.linalg.det(dq) != 0)
+    apart = (np.abs(np.linalg.det(dp)) > WIDE_STEP * side * side) & (np.linalg.det(dq) != 0)
     return dq[apart] @ np.linalg.inv(dp[apart])
 
 

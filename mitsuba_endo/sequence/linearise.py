@@ -26,6 +26,8 @@ Bools = NDArray[np.bool_]
 
 _STEP = 1e-6
 """Of numerical derivatives of the projection, relative to the distance."""
+_CLEAR_GRADIENT = 0.3
+"""Length of the signed distance's gradient below which it has no direction; 1 on a clean wall."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ def against_map(
     at = interpolate(volume, camera.apply(points.T))
     normal = camera.R.T @ at.gradient.T
     length = np.sqrt(dot(normal, normal))
-    known = at.known & found.good & (length > 0.3)
+    known = at.known & found.good & (length > _CLEAR_GRADIENT)
     normal = normal / np.where(length > 0, length, 1.0)
     cosine = dot(normal, sample.rays)
     own = np.concatenate([cross(points, normal), normal])

@@ -25,6 +25,8 @@ POLYP_REFINEMENT = 2.5
 """How much closer vertices lie at a polyp than elsewhere."""
 ALONG = 0.7
 """Cells are shorter along the tube and longer around it: folds are curved along it."""
+OPEN = 0.8
+"""Share of the radius that folds may fill, and of the axis' radius of curvature that a tube may."""
 
 
 @plain_dataclass(frozen=True, eq=False)
@@ -102,13 +104,13 @@ class Colon:
 
     def __post_init__(self) -> None:
         rises = self.fold_depth + self.tenia_depth + 4 * self.roughness
-        if rises > 0.8 * self.radius:
+        if rises > OPEN * self.radius:
             raise InputError(
                 f"folds of {rises:.3g} mm nearly close a tube of radius {self.radius:g} mm",
                 where="colon: fold_depth",
                 todo="keep fold_depth + tenia_depth below 0.8 radius",
             )
-        if self._line().sharpest * self.radius > 0.8:
+        if self._line().sharpest * self.radius > OPEN:
             raise InputError(
                 f"a tube of radius {self.radius:g} mm cannot turn by {self.bend:g} rad "
                 f"in {self.length:g} mm",

@@ -20,6 +20,8 @@ FILLET = 0.12
 
 BLEND = 0.75
 """Width of the flattened wall around the foot, in diameters."""
+FLATTEST = 0.1
+"""Height of the flattest polyp over its diameter: flatter ones are no cap beside their fillet."""
 
 
 @dataclass(frozen=True, kw_only=True, config=CHECKED)
@@ -39,7 +41,10 @@ class Polyp:
     """Height over the wall, mm; none means half the diameter: a hemisphere."""
 
     def __post_init__(self) -> None:
-        if self.height is not None and not 0.1 * self.diameter <= self.height <= self.diameter / 2:
+        if (
+            self.height is not None
+            and not FLATTEST * self.diameter <= self.height <= self.diameter / 2
+        ):
             raise InputError(
                 f"a height of {self.height:g} mm does not suit a diameter of {self.diameter:g} mm",
                 where="polyp: height",

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
+_AT_CENTRE = 1e-9
+"""Slope, per mm, at an ellipsoid's centre, where the first-order distance has no value."""
 
 
 def ellipsoid(centre: ArrayLike, radii: ArrayLike, rotation: Rotation | None = None) -> Field:
@@ -25,8 +27,8 @@ def ellipsoid(centre: ArrayLike, radii: ArrayLike, rotation: Rotation | None = N
         # First-order distance |local/axes| (|local/axes| - 1) / |local/axes^2|, exact at zero.
         near = np.linalg.norm(local / axes, axis=-1)
         slope = np.linalg.norm(local / axes**2, axis=-1)
-        distance = near * (near - 1) / np.maximum(slope, 1e-9)
-        return np.where(slope > 1e-9, distance, -axes.min())  # the centre itself
+        distance = near * (near - 1) / np.maximum(slope, _AT_CENTRE)
+        return np.where(slope > _AT_CENTRE, distance, -axes.min())  # the centre itself
 
     return field
 

@@ -11,6 +11,9 @@ import numpy as np
 
 from ...geometry.arrays import Array, namespace
 
+STEADY = 0.98
+"""A scale that falls to no less than this share of itself in an iteration has settled. Chosen."""
+
 
 @dataclass(frozen=True)
 class Loss:

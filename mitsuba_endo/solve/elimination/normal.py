@@ -17,6 +17,9 @@ from .banded import BandedCholesky
 from .coupling import Coupling
 from .linearisation import Linearisation
 
+_RANK = 1e-12
+"""Eigenvalue over the largest, the diagonal scaled to one, of a direction that nothing tells."""
+
 
 @dataclass(eq=False)
 class SurfaceBlock:
@@ -209,6 +212,6 @@ def _solve_symmetric(S: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[
     values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
     if len(values) and values[-1] <= 0:
         raise np.linalg.LinAlgError("no information")
-    keep = values > 1e-12 * values.max(initial=0.0)
+    keep = values > _RANK * values.max(initial=0.0)
     inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
     return scale * (vectors @ (inverse * (vectors.T @ (scale * g))))

@@ -16,6 +16,8 @@ AMBIGUOUS = "another pose explains the correspondences as well, see alternatives
 """Why a pose with an undecided rival is weak."""
 _REGION = 5.0
 """A rival within this many standard deviations of the solution's pose is the same calibration."""
+_OTHER_FOCAL = 1e-4
+"""Relative difference from which on an alternative's focal length is told: six digits are shown."""
 
 
 def ambiguities(
@@ -78,7 +80,11 @@ def alternative(rival: Rival, names: list[str], found: RigidTransform, focal: fl
         if rival.decided
         else "it fits as well within the noise, so the residuals cannot choose"
     )
-    other = f", focal length {rival.focal:.6g} px" if abs(rival.focal / focal - 1) > 1e-4 else ""
+    other = (
+        f", focal length {rival.focal:.6g} px"
+        if abs(rival.focal / focal - 1) > _OTHER_FOCAL
+        else ""
+    )
     return Alternative(
         frames=names,
         R=pose.R.tolist(),

@@ -18,6 +18,10 @@ MIN_FRAMES = 4
 """Frames from which on leaving out whole frames is meaningful."""
 _SMALLEST_BLOCK = 20
 """Observations below which a block is not worth leaving out."""
+_SINGULAR = 1e-12
+"""Eigenvalue over the largest, scaled: below, the block left out held all information."""
+_ONLY_HERE = 1e-9
+"""The same, at which a direction is one that only the frame left out tells."""
 
 
 def _block_contributions(
@@ -100,7 +104,7 @@ def _step_without(
     g_S, with the prior's part, vanishes at the optimum.
     """
     scale, values, vectors = _scaled(reduced.S, H)
-    if len(values) and values[0] <= 1e-12 * values[-1]:
+    if len(values) and values[0] <= _SINGULAR * values[-1]:
         return None
     return scale * (vectors @ ((vectors.T @ (scale * (g - reduced.g))) / values))
 
@@ -110,7 +114,7 @@ def _step_without_frame(
 ) -> NDArray[np.float64]:
     """Return the same without a frame; unknowns that only it tells keep their value."""
     scale, values, vectors = _scaled(reduced.S, H)
-    known = values > 1e-9 * values.max(initial=0.0)
+    known = values > _ONLY_HERE * values.max(initial=0.0)
     inverse = np.where(known, 1 / np.maximum(values, 1e-300), 0.0)
     return scale * (vectors @ (inverse * (vectors.T @ (scale * (g - reduced.g)))))
 

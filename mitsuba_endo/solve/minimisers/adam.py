@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
-from ..costs.loss import NoiseScale
+from ..costs.loss import STEADY, NoiseScale
 from ..costs.problem import Evaluation, Problem, evaluate, gradient
 from ..options import Options
 from ..unknowns.block import BLOCKS
@@ -118,7 +118,7 @@ class Adam:
         after = replace(now, at=at, noise=noise, moments=moments, trace=(*now.trace, row))
         # Both under the scale of now, or its fall would pass for progress.
         gain = 1 - at.cost(noise) / now.at.cost(noise)
-        steady = noise.last or noise.sigma > 0.98 * now.noise.sigma
+        steady = noise.last or noise.sigma > STEADY * now.noise.sigma
         if not steady or gain >= _GAIN:
             return after
         return replace(after, rate=now.rate / 2) if now.rate > _LAST_RATE else _next_stage(after)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
-from ..costs.loss import NoiseScale
+from ..costs.loss import STEADY, NoiseScale
 from ..costs.problem import Evaluation, Problem, evaluate
 from ..elimination.normal import NormalEquations
 from ..options import Options
@@ -103,7 +103,7 @@ class LevenbergMarquardt:
         if not settled and (flat or not tried.accepted):
             return _next_stage(after, Outcome.STALLED)
         followed = after.noise.followed(after.at.noise())
-        steady = after.noise.last or followed.sigma > 0.98 * after.noise.sigma
+        steady = after.noise.last or followed.sigma > STEADY * after.noise.sigma
         after = replace(after, noise=followed)
         return _next_stage(after, Outcome.CONVERGED) if settled and steady else after
 

@@ -12,6 +12,8 @@ _LISTED = 6
 """Candidates that are recorded."""
 _NAMED = 4
 """Members of a group that are named in a sentence; of a larger one it is said that it is large."""
+_TOLD = 0.005
+"""Share of structure that is told: less rounds to 0 %."""
 
 
 def model_section(fit: Fit) -> dict[str, Any]:
@@ -52,7 +54,7 @@ def conclusion(check: ModelCheck) -> str:
         return "the residuals look like noise"
     out = [
         f"{100 * structure.excess:.0f} % of the residuals is structure that the model leaves out"
-        if structure.excess > 0.005
+        if structure.excess > _TOLD
         else "the residuals accuse a value that was given"
     ]
     out += [plan_advice(p.words) for p in check.refuted_plan[:1]]

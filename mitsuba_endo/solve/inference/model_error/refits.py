@@ -52,6 +52,8 @@ _SPREAD, _RANKS, _FEW = (0.8, 1.2, 2.0), 2, 300
 is tried, how many poses each, and how many correspondences propose them."""
 _SETTLED = 1e-3
 """Relative fall of the cost at which a refit ends."""
+_SETTLED_NOISE = 0.99
+"""A noise that falls to no less than this share of itself in a step has settled. Chosen."""
 _DAMPING = (1e-4, 10.0, 0.1)
 """First one, and the factors after a failed and a successful step."""
 _CAUCHY = 2.5
@@ -274,7 +276,7 @@ def _solved(sample: _Sample, way: Way, now: _Point, iterations: int) -> _Point:
             break
         mu, now = mu * down, trial
         followed = min(sigma, _noise(now.r))
-        if gained < _SETTLED * cost and followed > 0.99 * sigma:
+        if gained < _SETTLED * cost and followed > _SETTLED_NOISE * sigma:
             break
         sigma = followed
     return now
