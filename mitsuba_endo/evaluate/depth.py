@@ -34,7 +34,7 @@ class RayCaster:
         """Return the distance, as :meth:`range`, and the face (N,) that is met, 0 for a miss."""
         import mitsuba as mi
 
-        from ..rendering.coordinates import distances
+        from ..rendering.ray_triangle import distances
 
         start = mi.Point3f(origin.astype(np.float32))
         index, hit = self._mesh.cast(start, mi.Vector3f(directions.T.astype(np.float32)))

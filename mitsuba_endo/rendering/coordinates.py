@@ -1,19 +1,16 @@
 """R(S, C, P) at one pixel: from a camera ray over the surface to the projector coordinate.
 
-The only place where a ray meets a triangle and a point becomes a pattern coordinate. Components are
-Dr.Jit scalars of one entry a pixel; what is differentiated is up to whoever made them.
+The only place where a point becomes a pattern coordinate; ``ray_triangle`` tells where a ray meets
+the surface. Components are Dr.Jit scalars of one entry a pixel; what is differentiated is up to
+whoever made them.
 """
 
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
 from .mitsuba_modules import dr, mi
-from .moving_mesh import vector
 
 
 class Projects(Protocol):
@@ -61,36 +58,6 @@ class Pose:
         """Rotate a vector."""
         turned = self.R @ direction
         return turned if self.turn is None else turned + dr.cross(self.turn, turned)
-
-
-def plane_distance(origin: Any, direction: Any, corners: Any) -> Any:
-    """Return how far along ``direction`` a ray meets the plane of a triangle, in its lengths.
-
-    s = n . (a - o) / n . w with the normal n = (b - a) x (c - a): differentiable with respect to
-    everything while the triangle that is hit stays the same.
-    """
-    a, b, c = corners
-    normal = dr.cross(b - a, c - a)
-    return dr.dot(normal, a - origin) / dr.dot(normal, direction)
-
-
-def distances(
-    corners: NDArray[np.float64], origin: NDArray[np.float64], directions: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return :func:`plane_distance` (N,) of NumPy rays to their triangles (N, 3, 3).
-
-    Args:
-        corners: of every triangle.
-        origin: (3,) or (N, 3).
-        directions: (N, 3).
-
-    Returns:
-        NaN where a ray is parallel to its triangle.
-    """
-    a, b, c = (vector(corners[:, i]) for i in range(3))
-    start, way = vector(np.broadcast_to(origin, directions.shape)), vector(directions)
-    distance = plane_distance(start, way, (a, b, c)).numpy()
-    return np.where(np.isfinite(distance), distance, np.nan)
 
 
 def project_along(model: FrameModel, direction: Any, distance: Any) -> tuple[Any, Any, Any]:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from .coordinates import FrameModel, Pose, distances, project_along
+from .coordinates import FrameModel, Pose, project_along
 from .mitsuba_modules import mi
 from .moving_mesh import MovingMesh, cast_into, vector
+from .ray_triangle import distances
 
 _TOUCHES = 1e-3
 """Share of the distance within which a ray ends at the point it was sent to, not before it."""

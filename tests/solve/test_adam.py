@@ -8,7 +8,7 @@ import pytest
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.solve.costs.loss import NoiseScale
+from mitsuba_endo.solve.costs.noise_scale import NoiseScale
 from mitsuba_endo.solve.costs.problem import evaluate, gradient
 from mitsuba_endo.solve.frames.initialisation import start_frame
 from mitsuba_endo.solve.frames.single import separate_surfaces

@@ -11,7 +11,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.costs.drift import DriftTerm, drift, step_between
-from mitsuba_endo.solve.costs.loss import NoiseScale
+from mitsuba_endo.solve.costs.noise_scale import NoiseScale
 from mitsuba_endo.solve.costs.registry import priors_of
 from mitsuba_endo.solve.costs.term import Gradient
 from mitsuba_endo.solve.elimination.normal import NormalEquations

@@ -6,7 +6,7 @@ import pytest
 from mitsuba_endo.initialisation.plane import plane_start
 from mitsuba_endo.initialisation.search import search_start
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.solve.costs.loss import NoiseScale
+from mitsuba_endo.solve.costs.noise_scale import NoiseScale
 from mitsuba_endo.solve.inference.covariance import uncertainty
 from mitsuba_endo.solve.minimisers.levenberg_marquardt import LevenbergMarquardt
 from mitsuba_endo.solve.minimisers.minimise import minimise

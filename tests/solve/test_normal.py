@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.costs.loss import NoiseScale
+from mitsuba_endo.solve.costs.noise_scale import NoiseScale
 from mitsuba_endo.solve.costs.problem import Problem, evaluate, make_problem
 from mitsuba_endo.solve.costs.term import Gradient
 from mitsuba_endo.solve.elimination.normal import NormalEquations

@@ -12,7 +12,7 @@ from ..elimination.linearisation import Linearisation, whiten
 from ..elimination.normal import NormalEquations
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .loss import NoiseScale
+from .noise_scale import NoiseScale
 from .renderer import FrameRenderer
 from .term import Gradient, Term
 

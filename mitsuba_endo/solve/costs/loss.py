@@ -5,14 +5,11 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.arrays import Array, namespace
-
-STEADY = 0.98
-"""A scale that falls to no less than this share of itself in an iteration has settled. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -52,40 +49,3 @@ LOSSES = {
     # Biweight, redescending: ends the optimisation, since Cauchy leaves a bias under many outliers.
     "tukey": Loss("tukey", _tukey, _tukey_weight, efficient_scale=6.5),
 }
-
-
-@dataclass(frozen=True)
-class NoiseScale:
-    """Noise of one coordinate and the robust loss that goes with it, in two stages.
-
-    First the published Cauchy loss, whose scale falls with the residuals; then, with the noise
-    fixed, the loss that ends the optimisation.
-    """
-
-    sigma: float
-    """Pattern pixels."""
-    last_loss: str
-    """Name in :data:`LOSSES` of the last stage's loss."""
-    last: bool = False
-    """Whether this is the last stage."""
-
-    @property
-    def loss(self) -> Loss:
-        return LOSSES[self.last_loss if self.last else "cauchy"]
-
-    @property
-    def scale(self) -> float:
-        """Scale of the robust loss, pattern pixels."""
-        return self.loss.efficient_scale * self.sigma
-
-    def followed(self, estimate: float) -> "NoiseScale":
-        """Return the scale after it has followed an estimate of the noise downwards."""
-        return self if self.last else replace(self, sigma=min(estimate, self.sigma))
-
-    def final(self, estimate: float) -> "NoiseScale":
-        """Return the last stage's, with an estimate of the noise."""
-        return replace(self, sigma=estimate, last=True)
-
-    def at(self, sigma: float) -> "NoiseScale":
-        """Return the same loss for another noise."""
-        return replace(self, sigma=sigma)

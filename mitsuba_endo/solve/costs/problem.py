@@ -16,17 +16,12 @@ from ..surfaces.surface import Surface
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
 from .coordinates import CoordinateTerm, FrameResiduals, Observations
-from .loss import NoiseScale
+from .noise_scale import NoiseScale, robust_noise
 from .renderer import FrameRenderer, SurfaceScene
 from .smoothness import SmoothnessTerm
 from .term import Gradient, Term
 
 Floats = NDArray[np.float64]
-
-_MEDIAN_RADIUS = 1.1774100225154747
-"""Median length of a two-dimensional standard normal vector, sqrt(2 ln 2)."""
-_SMALLEST_NOISE = 1e-4
-"""Floor of the noise estimate, pattern pixels: the precision of a float32 map."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,14 +195,6 @@ class Evaluation:
     def noise(self) -> float:
         """Return the robust standard deviation of one whitened component, pattern pixels."""
         return robust_noise(np.concatenate([r.squared for r in self.frames]))
-
-
-def robust_noise(squared: Floats) -> float:
-    """Return the standard deviation of one component, from squared lengths (N,), NaN = none."""
-    squared = squared[np.isfinite(squared)]
-    if not len(squared):
-        return _SMALLEST_NOISE
-    return max(float(np.sqrt(np.median(squared))) / _MEDIAN_RADIUS, _SMALLEST_NOISE)
 
 
 def evaluate(problem: Problem, state: State) -> Evaluation:

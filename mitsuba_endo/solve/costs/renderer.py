@@ -18,11 +18,11 @@ from ...rendering.coordinates import (
     FrameModel,
     Pose,
     camera_rays,
-    plane_distance,
     project_along,
 )
 from ...rendering.mitsuba_modules import dr, mi
 from ...rendering.moving_mesh import MovingMesh, vector
+from ...rendering.ray_triangle import plane_distance
 from ..elimination.linearisation import Linearisation
 from ..surfaces.surface import Surface
 from ..unknowns.block import BLOCKS

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..elimination.normal import NormalEquations
 from ..surfaces.surface import Bending, Surface
 from ..unknowns.state import State
-from .loss import NoiseScale
+from .noise_scale import NoiseScale
 from .term import Gradient, Term
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from ..elimination.normal import NormalEquations
 from ..unknowns.block import BLOCKS
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .loss import NoiseScale
+from .noise_scale import NoiseScale
 
 Floats = NDArray[np.float64]
 _STEP = 1e-6

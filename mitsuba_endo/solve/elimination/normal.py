@@ -1,8 +1,7 @@
 """Normal equations, sparse over surface vertices and dense over the global unknowns.
 
-With surface blocks A_s, their coupling B_s to the global unknowns and the global block D, the
-surfaces are eliminated: S = D - sum_s B_s^T A_s^-1 B_s (Schur complement), S dx = reduced
-gradient, then the surfaces follow by back-substitution.
+J^T W J of the residuals, summed frame by frame: a block A_s of each surface, its coupling B_s to
+the global unknowns, and their own block D. ``schur_complement`` solves them.
 """
 
 from collections.abc import Sequence
@@ -13,46 +12,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..surfaces.surface import Surface
-from .banded import BandedCholesky
 from .coupling import Coupling
 from .linearisation import Linearisation
-
-_RANK = 1e-12
-"""Eigenvalue over the largest, the diagonal scaled to one, of a direction that nothing tells."""
-
-
-@dataclass(eq=False)
-class SurfaceBlock:
-    """Part of the normal equations that belongs to one surface."""
-
-    A: sp.csr_array
-    """(V, V) Hessian of data and prior."""
-    B: Coupling
-    """(V, G) coupling to the global unknowns."""
-    g: NDArray[np.float64]
-    """(V,) gradient."""
-    bandwidth: int
-
-    def damped(self, mu: float) -> BandedCholesky:
-        """Factorise A + mu diag(A)."""
-        diagonal = self.A.diagonal()
-        # A vertex without data or neighbours would make A singular.
-        floor = 1e-12 * diagonal.max(initial=1.0)
-        return BandedCholesky.of(
-            self.A + sp.diags_array(mu * diagonal + floor, format="csr"), self.bandwidth
-        )
-
-    def eliminated(self, factor: BandedCholesky) -> NDArray[np.float64]:
-        """Return [B, g]^T A^-1 [B, g], (G + 1, G + 1), from the factor of A.
-
-        With Y = L^-1 [B, g] it is the sum of Y_i^T Y_i over blocks of rows, of which two are held
-        at a time.
-        """
-        total = np.zeros((self.B.shape[1] + 1,) * 2)
-        rhs = (np.column_stack([self.B.rows(i), self.g[i]]) for i in factor.blocks)
-        for Y in factor.forward(rhs):
-            total += Y.T @ Y
-        return total
+from .schur_complement import (
+    Reduced,
+    Step,
+    SurfaceBlock,
+    eliminate,
+    solve_step,
+    solve_symmetric,
+)
 
 
 @dataclass(eq=False)
@@ -108,59 +77,22 @@ class NormalEquations:
         self.D += hessian
         self.g += gradient
 
-    def solve(self, mu: float) -> "Step":
+    def solve(self, mu: float) -> Step:
         """Return the step under damping ``mu``.
 
         Raises:
             numpy.linalg.LinAlgError: the damped system is not positive definite.
         """
-        reduced = self.reduce(mu)
-        S = reduced.S + mu * np.diag(np.diag(self.D))
-        step = -_solve_symmetric(S, reduced.g)
-        surfaces = [
-            -factor.solve(block.g + block.B @ step)
-            for factor, block in zip(reduced.factors, self.surfaces, strict=True)
-        ]
-        return Step(surfaces, step, reduced.S)
+        return solve_step(self.surfaces, self.D, self.reduce(mu), mu)
 
     def undamped(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the step (G,) of the global unknowns without damping, and the Schur complement."""
         reduced = self.reduce()
-        return -_solve_symmetric(reduced.S, reduced.g), reduced.S
+        return -solve_symmetric(reduced.S, reduced.g), reduced.S
 
-    def reduce(self, mu: float = 0.0) -> "Reduced":
+    def reduce(self, mu: float = 0.0) -> Reduced:
         """Eliminate the surfaces."""
-        S, g = self.D.copy(), self.g.copy()
-        factors = [block.damped(mu) for block in self.surfaces]
-        for block, factor in zip(self.surfaces, factors, strict=True):
-            total = block.eliminated(factor)
-            S -= total[:-1, :-1]
-            g -= total[:-1, -1]
-        return Reduced((S + S.T) / 2, g, factors)
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A step that lowers the cost to first order."""
-
-    surfaces: list[NDArray[np.float64]]
-    """(V,) of every surface's values."""
-    unknowns: NDArray[np.float64]
-    """(G,) of the global unknowns."""
-    schur: NDArray[np.float64]
-    """(G, G) Schur complement, without damping of the global unknowns."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reduced:
-    """The normal equations after elimination of the surfaces."""
-
-    S: NDArray[np.float64]
-    """(G, G) Schur complement."""
-    g: NDArray[np.float64]
-    """(G,) reduced gradient."""
-    factors: list[BandedCholesky]
-    """Of every surface's A."""
+        return eliminate(self.surfaces, self.D, self.g, mu)
 
 
 def surface_hessian(lin: Linearisation, weight: NDArray[np.float64]) -> sp.csr_array:
@@ -204,14 +136,3 @@ def surface_rows(lin: Linearisation, root: NDArray[np.float64], vertices: int) -
     columns = np.concatenate([lin.triangles] * components).ravel()
     rows = components * len(root)
     return sp.csr_array((values, columns, np.arange(0, 3 * rows + 1, 3)), (rows, vertices))
-
-
-def _solve_symmetric(S: NDArray[np.float64], g: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve S x = g after scaling the diagonal to one; directions without information stay put."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(S), 1e-300))
-    values, vectors = np.linalg.eigh(S * np.outer(scale, scale))
-    if len(values) and values[-1] <= 0:
-        raise np.linalg.LinAlgError("no information")
-    keep = values > _RANK * values.max(initial=0.0)
-    inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
-    return scale * (vectors @ (inverse * (vectors.T @ (scale * g))))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...fusion.curvature import averaging, curvatures
 from ...fusion.fuse import FusedMesh
-from ..costs.problem import robust_noise
+from ..costs.noise_scale import robust_noise
 from ..inference.fit import FrameSolution
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from ..elimination.banded import BandedCholesky
 from ..elimination.coupling import Coupling
-from ..elimination.normal import NormalEquations, Reduced
+from ..elimination.normal import NormalEquations
+from ..elimination.schur_complement import Reduced
 from ..minimisers.result import OptimisationResult
 from .information import data_information
 from .jackknife import jackknives

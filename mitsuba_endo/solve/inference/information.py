@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ..costs.problem import evaluate
 from ..costs.term import ResidualTerm
-from ..elimination.normal import NormalEquations, Reduced, SurfaceBlock, surface_rows
+from ..elimination.normal import NormalEquations, surface_rows
+from ..elimination.schur_complement import Reduced, SurfaceBlock
 from ..minimisers.result import OptimisationResult
 from ..unknowns.state import State
 from .observability import problem_unknowns

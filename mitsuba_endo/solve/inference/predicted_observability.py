@@ -4,7 +4,7 @@ A forecast, made where surface and poses are only roughly right; the verdict at 
 counts neither regularisers nor noise as information and replaces it.
 """
 
-from ..costs.loss import NoiseScale
+from ..costs.noise_scale import NoiseScale
 from ..costs.problem import Problem, evaluate
 from ..unknowns.state import State
 from .information import inverse_information

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
-from ..costs.loss import STEADY, NoiseScale
+from ..costs.noise_scale import STEADY, NoiseScale
 from ..costs.problem import Evaluation, Problem, evaluate, gradient
 from ..options import Options
 from ..unknowns.block import BLOCKS

@@ -6,7 +6,7 @@ from typing import Protocol, TypeVar
 from ...errors import InputError
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
-from ..costs.loss import NoiseScale
+from ..costs.noise_scale import NoiseScale
 from ..costs.problem import Evaluation, Problem
 from ..options import Options
 from ..unknowns.state import State

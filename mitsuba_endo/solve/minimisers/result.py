@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
-from ..costs.loss import NoiseScale
+from ..costs.noise_scale import NoiseScale
 from ..costs.problem import Evaluation, Problem
 from ..elimination.normal import NormalEquations
 from ..unknowns.state import State

@@ -6,7 +6,7 @@ shape. So calibration uses a weak prior, and the surface is smoothed afterwards,
 
 from dataclasses import replace
 
-from ..costs.loss import NoiseScale
+from ..costs.noise_scale import NoiseScale
 from ..costs.problem import Problem, evaluate
 from ..costs.smoothness import SmoothnessTerm, prior_weight
 from ..options import Options
