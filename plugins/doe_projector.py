@@ -8,9 +8,9 @@ from mitsuba_endo.geometry.projection_models import (
     projector_model,
 )
 from mitsuba_endo.rendering.axes import fraction_from_pixel, pixel_from_fraction, swap_axes
-from mitsuba_endo.rendering.coordinates import project_direction
 from mitsuba_endo.rendering.keys import DISTORTION
 from mitsuba_endo.rendering.mitsuba_modules import dr, mi
+from mitsuba_endo.rendering.projector_coordinates import project_direction
 
 from .variants import make_opaque, pointer_to, read_number, read_to_world, variant_class
 

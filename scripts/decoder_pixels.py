@@ -15,7 +15,7 @@ from mitsuba_endo import backend
 from mitsuba_endo.dataset.truth import MIXED, largest_step
 from mitsuba_endo.decoding.network import load_network
 from mitsuba_endo.learn.compose import NEAR_NODE, Targets
-from mitsuba_endo.learn.metrics import pixel_metrics
+from mitsuba_endo.learn.pixel_metrics import pixel_metrics
 from scripts.benchmarks.decoder_scenes import KINDS, PATTERN, Shot, shoot
 
 Option = typer.Option

@@ -10,8 +10,8 @@ from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
 from mitsuba_endo.robust import robust_std
 
 from .correspondences import Correspondences
-from .propose import facing, planar_poses, same_pose
-from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
+from .epipolar_refinement import EpipolarLoss, EpipolarState, evaluate, minimise
+from .relative_pose_ransac import facing, planar_poses, same_pose
 from .result import Candidate
 from .vectors import Vectors
 
@@ -99,7 +99,7 @@ def refine(
     if not minima:
         return []
     best = minima[0].state
-    twins = _graduated(problem, _twins(best, data), data, GRADUATED_PX[1:], rival=best)
+    twins = _graduated(problem, _twins(best, data), data, GRADUATED_PX[1:], alternative=best)
     redescended = [_redescend(problem, s, data) for s in twins]
     return ranked([*minima, *_valid(redescended, data)])
 
@@ -137,15 +137,15 @@ def _graduated(
     states: list[EpipolarState],
     data: Correspondences,
     scales: tuple[float, ...],
-    rival: EpipolarState | None = None,
+    alternative: EpipolarState | None = None,
 ) -> list[EpipolarState]:
     """Descend from all states through the Cauchy scales; merge and drop between the scales."""
-    rivals = [] if rival is None else [rival]
+    alternatives = [] if alternative is None else [alternative]
     for scale in scales:
         loss = EpipolarLoss(False, scale)
         states = [_descend(problem, s, data, loss) for s in states]
         states = _without_repeats(sorted(states, key=lambda s: loss.cost(s.r)))
-        states = _competitive(problem, states, [*states, *rivals], loss)
+        states = _competitive(problem, states, [*states, *alternatives], loss)
     return states
 
 

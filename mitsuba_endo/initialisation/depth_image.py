@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .choose import robust_scale
 from .correspondences import Correspondences
-from .refine import EpipolarState
+from .epipolar_refinement import EpipolarState
 from .triangulate import ranges
 
 KEEP = 5.0

@@ -9,11 +9,11 @@ from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 from .choose import robust_scale
-from .clean import clean_map
 from .correspondences import Correspondences, checked_map, gather
 from .depth_image import depth_image
-from .propose import ladder
-from .refine import evaluate
+from .epipolar_refinement import evaluate
+from .outlier_rejection import clean_map
+from .relative_pose_ransac import ladder
 from .result import Start
 from .triangulate import in_front
 

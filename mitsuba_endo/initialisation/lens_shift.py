@@ -18,7 +18,6 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.projection_models import ProjectorModel
 
 from .choose import MIN_SCALE_PX, REDESCENDING, RefinementProblem, refine, robust_scale
-from .clean import clean_map, noise_scale
 from .correspondences import (
     PROPOSE_POINTS,
     REFINE_POINTS,
@@ -27,8 +26,9 @@ from .correspondences import (
     gather,
     spread_sample,
 )
-from .propose import distinct, focal_lengths, propose
-from .refine import EpipolarLoss, EpipolarState, evaluate, minimise
+from .epipolar_refinement import EpipolarLoss, EpipolarState, evaluate, minimise
+from .outlier_rejection import clean_map, noise_scale
+from .relative_pose_ransac import distinct, focal_lengths, propose
 from .result import Start
 
 HEIGHTS = (-0.25, 0.0, 0.25, 0.5, 0.75, 1.0, 1.25)

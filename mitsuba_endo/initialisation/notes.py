@@ -4,7 +4,7 @@ import numpy as np
 
 from .choose import REDESCENDING, SIMILAR_COST, Minimum, robust_scale
 from .correspondences import Correspondences
-from .refine import EpipolarLoss, EpipolarState, focal_deviation
+from .epipolar_refinement import EpipolarLoss, EpipolarState, focal_deviation
 from .triangulate import ranges
 from .vectors import Vectors
 

@@ -11,9 +11,9 @@ from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform
 
 from .choose import robust_scale
-from .clean import clean_map
 from .correspondences import checked_map, gather
-from .refine import evaluate
+from .epipolar_refinement import evaluate
+from .outlier_rejection import clean_map
 from .result import Start
 
 

@@ -8,7 +8,6 @@ from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.projection_models import ProjectorModel
 
 from .choose import Minimum, RefinementProblem, finish, refine, robust_scale
-from .clean import clean_map, noise_scale
 from .correspondences import (
     PROPOSE_POINTS,
     REFINE_POINTS,
@@ -18,9 +17,10 @@ from .correspondences import (
     spread_sample,
 )
 from .depth_image import depth_image
+from .epipolar_refinement import evaluate
 from .notes import remarks
-from .propose import distinct, focal_lengths, propose
-from .refine import evaluate
+from .outlier_rejection import clean_map, noise_scale
+from .relative_pose_ransac import distinct, focal_lengths, propose
 from .result import Start
 
 FINISH_POINTS = 40_000

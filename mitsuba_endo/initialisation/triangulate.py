@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.geometry.transforms import RigidTransform
 
-from .clean import median_filter
-from .epipolar import Bearings, Residuals
+from .epipolar_residual import Bearings, Residuals
+from .outlier_rejection import median_filter
 from .vectors import Vectors, cross, dot, skew
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ..files import atomic_path
-from .metrics import PixelMetrics
+from .pixel_metrics import PixelMetrics
 from .validation import SCENARIOS
 
 Row = dict[str, float | str]

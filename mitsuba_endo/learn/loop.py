@@ -19,8 +19,8 @@ from .cache import ViewCache
 from .curves import Row, rows, save_curves, save_table
 from .examples import Example, TrainingExamples
 from .export import export_onnx
-from .loss import losses
 from .model import DecoderNet
+from .training_loss import losses
 from .validation import ValidationImage, evaluate
 
 DECAY = 0.995

@@ -11,8 +11,8 @@ from ..decoding.network import CHANNELS, read_heads
 from ..decoding.normalise import normalise
 from .cache import ViewCache
 from .compose import Appearance, Targets, compose
-from .metrics import PixelMetrics, pixel_metrics
 from .patterns import grid_texture
+from .pixel_metrics import PixelMetrics, pixel_metrics
 
 UNSEEN = 5000
 """First seed of the grids used here, above all that training uses."""

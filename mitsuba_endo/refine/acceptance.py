@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .alternative_shifts import contest
 from .cells import Image, mean
 from .iterate import FAINT, Comparison, Refined
-from .rivals import contest
 
 LEAST = 0.3
 """Correlation of image and model, and ..."""
@@ -25,7 +25,7 @@ AROUND = 5
 COVERED = 0.15
 """Share of a full window that must hold usable pixels."""
 BEATEN = -0.005
-"""Margin to the best rival under which the rival has won."""
+"""Margin to the best alternative under which the alternative has won."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Verdict:
     beaten: NDArray[np.bool_]
     """The image looks like another place of the pattern, a whole period away."""
     margin: Image
-    """By how much the correlation here exceeds the best rival's."""
+    """By how much the correlation here exceeds the best alternative's."""
     correlation: Image
     """Of the image with the model, offset and its slope taken away; 0 to 1."""
 
@@ -56,15 +56,15 @@ def judge(frame: Comparison, refined: Refined, covariance: Image) -> Verdict:
     correlation = np.sqrt(np.clip(explained, 0, 1)).reshape(shape).astype(np.float32)
     covered = _covered(frame) & (mean(frame.usable) > 0)
     usual = float(np.median(correlation[covered])) if covered.any() else 1.0
-    own, rival = contest(frame, refined)
-    beaten = covered & (own - rival < BEATEN) & (rival >= LEAST)
+    own, alternative = contest(frame, refined)
+    beaten = covered & (own - alternative < BEATEN) & (alternative >= LEAST)
     good = covered & ~beaten & (correlation >= max(LEAST, USUAL * usual))
     good &= fit.gain.reshape(shape) > FAINT
     good &= np.linalg.norm(refined.step, axis=-1) < UNSTEADY
     good &= _agrees(refined.moved)
     largest = np.maximum(covariance[..., 0], covariance[..., 2])
     good &= (largest > 0) & (largest < UNCERTAIN**2)
-    return Verdict(good, beaten, own - rival, correlation)
+    return Verdict(good, beaten, own - alternative, correlation)
 
 
 def _covered(frame: Comparison) -> NDArray[np.bool_]:

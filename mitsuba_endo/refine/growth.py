@@ -21,7 +21,7 @@ period."""
 CLEAR = 0.9
 """Share of the median correlation, and ..."""
 SURE = 0.5
-"""... of the median margin to the best rival, that a grown cell must reach."""
+"""... of the median margin to the best alternative, that a grown cell must reach."""
 KNOWN = 0.4
 """Largest standard deviation of a grown cell, pattern pixels: at folds nothing else tells that the
 surface ended."""

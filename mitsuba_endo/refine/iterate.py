@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from ..robust import robust_std
 from .cells import SIDE, Image, Links, blend
+from .image_view import ImageView
 from .options import RefineOptions
 from .pattern_image import PatternImage
 from .regression import Ridges, WindowFit, normal_equations, solve
 from .smoother import Smoother
-from .view import ImageView
 from .windows import Windows
 
 DARK = 0.7

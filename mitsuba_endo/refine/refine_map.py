@@ -11,12 +11,12 @@ from .acceptance import Verdict, judge
 from .cells import Image, Links, any_in, blend, padded, repeated
 from .folds import find_links
 from .growth import Grown, grow
+from .image_view import view_of
 from .iterate import Comparison, Refined, iterate
 from .options import RefineOptions
 from .pattern_image import PatternImage
 from .smoother import Smoother
 from .uncertainty import cell_covariance
-from .view import view_of
 from .windows import Windows
 
 WIDER = 2.0

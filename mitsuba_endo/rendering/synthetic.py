@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from .coordinates import FrameModel, Pose, project_along
 from .mitsuba_modules import mi
 from .moving_mesh import MovingMesh, cast_into, vector
+from .projector_coordinates import FrameModel, Pose, project_along
 from .ray_triangle import distances
 
 _TOUCHES = 1e-3

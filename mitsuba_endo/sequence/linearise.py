@@ -16,7 +16,7 @@ from ..fusion import Volume
 from ..fusion.interpolate import interpolate
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..initialisation.epipolar import residuals
+from ..initialisation.epipolar_residual import residuals
 from ..initialisation.triangulate import ranges
 from ..initialisation.vectors import cross, dot
 from .view import PixelSample

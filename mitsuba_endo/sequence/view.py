@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
-from ..initialisation.clean import clean_map
-from ..initialisation.epipolar import Bearings, bearings
+from ..initialisation.epipolar_residual import Bearings, bearings
+from ..initialisation.outlier_rejection import clean_map
 from ..records.correspondence import CorrespondenceMap
 
 Floats = NDArray[np.float64]

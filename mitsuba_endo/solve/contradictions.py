@@ -4,7 +4,7 @@ from ..errors import InputError
 from ..records.checkpoint import Checkpoint
 from ..records.rig import Rig
 from .options import Options
-from .surfaces.mesh import TriangleMesh
+from .surfaces.triangle_mesh import TriangleMesh
 from .unknowns.layout import Layout
 
 _LATTICE = "leave the surface a lattice"

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..records.calibration import Snapshot, TraceRow
 from ..records.history import Observe
-from .costs.problem import Problem
+from .costs.objective import Problem
 from .minimisers.minimise import OnIteration
 from .surfaces.surface import Surface
 from .unknowns.state import State

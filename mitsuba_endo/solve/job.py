@@ -11,8 +11,8 @@ from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.solution import LeftOut
-from .frames.initialisation import without_faults
-from .frames.projector_centre import centre_is_assumed, resumed_centre, searched_centre
+from .frames.centre_search import centre_is_assumed, resumed_centre, searched_centre
+from .frames.initial_poses import without_faults
 from .history import History
 from .inference.observability import Direction
 from .minimisers.minimise import Progress

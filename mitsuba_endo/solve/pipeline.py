@@ -9,15 +9,15 @@ from ..records.calibration import TraceRow
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut, Outcome
-from .costs.problem import Problem, make_problem
+from .costs.objective import Problem, make_problem
 from .costs.registry import priors_of
-from .frames.alone import solve_alone
-from .frames.initialisation import common_start, usable_starts, without_faults, without_repeats
+from .frames.initial_poses import common_start, usable_starts, without_faults, without_repeats
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
 from .frames.joint_mesh import joint_mesh_problem
 from .frames.restart import with_restarts
 from .frames.resume import resumed_maps, resumed_problem
-from .frames.single import separate_surfaces
+from .frames.separate_surfaces import separate_surfaces
+from .frames.single_frames import solve_alone
 from .history import History
 from .inference.covariance import uncertainty
 from .inference.fit import Fit, FrameSolution

@@ -8,9 +8,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mitsuba_endo.records.calibration import TraceRow
-from mitsuba_endo.solve.costs.problem import Problem, evaluate
-from mitsuba_endo.solve.frames.initialisation import start_frame
-from mitsuba_endo.solve.frames.single import separate_surfaces
+from mitsuba_endo.solve.costs.objective import Problem, evaluate
+from mitsuba_endo.solve.frames.initial_poses import start_frame
+from mitsuba_endo.solve.frames.separate_surfaces import separate_surfaces
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options

@@ -12,7 +12,7 @@ from mitsuba_endo.records.rig import Camera, Rig
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.contradictions import check_surface
 from mitsuba_endo.solve.costs.gaussian_prior import gaussian_prior
-from mitsuba_endo.solve.frames.initialisation import start_frame
+from mitsuba_endo.solve.frames.initial_poses import start_frame
 from mitsuba_endo.solve.minimisers.minimise import minimiser_of
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.block import BLOCKS

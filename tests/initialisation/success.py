@@ -7,8 +7,8 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.geometry.cameras import CameraModel
 from mitsuba_endo.geometry.transforms import RigidTransform, angle_between
 from mitsuba_endo.initialisation.correspondences import gather
-from mitsuba_endo.initialisation.epipolar import jacobian
-from mitsuba_endo.initialisation.refine import evaluate
+from mitsuba_endo.initialisation.epipolar_refinement import evaluate
+from mitsuba_endo.initialisation.epipolar_residual import jacobian
 from mitsuba_endo.initialisation.result import Start
 from mitsuba_endo.initialisation.search import FINISH_POINTS, search_start
 from tests.rigs import Rig, random_rig, with_noise, with_outliers

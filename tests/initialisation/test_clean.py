@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from mitsuba_endo.initialisation.clean import clean_map, fill_nearest, median_filter, noise_scale
+from mitsuba_endo.initialisation.outlier_rejection import (
+    clean_map,
+    fill_nearest,
+    median_filter,
+    noise_scale,
+)
 from tests.rigs import random_rig, with_noise, with_outliers, with_slips
 
 

@@ -6,7 +6,7 @@ from scipy.optimize import minimize_scalar
 
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_from_vector, tangent_basis
-from mitsuba_endo.initialisation.epipolar import bearings, jacobian, residuals
+from mitsuba_endo.initialisation.epipolar_residual import bearings, jacobian, residuals
 
 POSE = RigidTransform.of([0.1, -0.2, 0.05], np.array([-0.8, 0.3, 0.25]) / np.sqrt(0.7925))
 MODELS = {

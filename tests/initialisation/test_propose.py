@@ -6,8 +6,14 @@ import pytest
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.initialisation.correspondences import gather, spread_sample
-from mitsuba_endo.initialisation.epipolar import bearings, residuals
-from mitsuba_endo.initialisation.propose import distinct, facing, planar_poses, propose, same_pose
+from mitsuba_endo.initialisation.epipolar_residual import bearings, residuals
+from mitsuba_endo.initialisation.relative_pose_ransac import (
+    distinct,
+    facing,
+    planar_poses,
+    propose,
+    same_pose,
+)
 from tests.rigs import cast, lopsided_camera, plane, random_rig, with_noise
 
 

@@ -5,7 +5,12 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import angle_between
 from mitsuba_endo.initialisation.correspondences import gather, spread_sample
-from mitsuba_endo.initialisation.refine import EpipolarLoss, evaluate, focal_deviation, minimise
+from mitsuba_endo.initialisation.epipolar_refinement import (
+    EpipolarLoss,
+    evaluate,
+    focal_deviation,
+    minimise,
+)
 from tests.rigs import random_rig, with_noise
 
 

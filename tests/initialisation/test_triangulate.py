@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.initialisation.correspondences import gather
-from mitsuba_endo.initialisation.refine import evaluate
+from mitsuba_endo.initialisation.epipolar_refinement import evaluate
 from mitsuba_endo.initialisation.triangulate import in_front, ranges, smooth_depth
 from tests.rigs import random_rig, with_noise
 

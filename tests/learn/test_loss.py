@@ -5,7 +5,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from mitsuba_endo.learn.loss import EDGE_BALANCE, losses, phase_chord  # noqa: E402
+from mitsuba_endo.learn.training_loss import EDGE_BALANCE, losses, phase_chord  # noqa: E402
 
 
 def _truth(seed: int = 0):

@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_endo.decoding.network import CHANNELS, read_heads
 from mitsuba_endo.learn.compose import Targets
-from mitsuba_endo.learn.metrics import phase_error, pixel_metrics
+from mitsuba_endo.learn.pixel_metrics import phase_error, pixel_metrics
 
 
 def _case() -> tuple[np.ndarray, Targets]:

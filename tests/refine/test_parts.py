@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from mitsuba_endo.refine.alternative_shifts import alternative_shifts
 from mitsuba_endo.refine.cells import SIDE, Links, blend, mean, padded
 from mitsuba_endo.refine.folds import find_links
 from mitsuba_endo.refine.pattern_image import grid_image
 from mitsuba_endo.refine.regression import COLUMNS, Ridges, normal_equations, solve
-from mitsuba_endo.refine.rivals import rival_shifts
 from mitsuba_endo.refine.smoother import Smoother
 from mitsuba_endo.refine.windows import REACH, Windows
 from tests.refine.views import GRID, coordinates
@@ -137,9 +137,9 @@ def test_tears_are_found_also_over_a_gap():
         assert links.down.all() or fold
 
 
-def test_rivals_of_the_grid_lie_a_period_away():
+def test_alternatives_in_the_grid_lie_a_period_away():
     """Oracle: the grid's period, 12, along both axes and diagonals."""
-    shifts = {tuple(s) for s in rival_shifts(grid_image(GRID)).tolist()}
+    shifts = {tuple(s) for s in alternative_shifts(grid_image(GRID)).tolist()}
     assert shifts == {(12 * i, 12 * j) for i in (-1, 0, 1) for j in (-1, 0, 1)} - {(0, 0)}
 
 

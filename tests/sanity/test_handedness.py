@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.sanity.examine import examine
 from mitsuba_endo.sanity.handedness import handedness, local_jacobians, positive_share
-from mitsuba_endo.solve.frames.initialisation import without_faults
+from mitsuba_endo.solve.frames.initial_poses import without_faults
 from tests.rigs import Rig
 from tests.sanity.given import map_of, noisy, record, thinned
 

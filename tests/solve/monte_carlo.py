@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_endo.solve.costs.problem import Problem, evaluate
-from mitsuba_endo.solve.elimination.normal import NormalEquations
+from mitsuba_endo.solve.costs.objective import Problem, evaluate
+from mitsuba_endo.solve.elimination.normal_equations import NormalEquations
 from mitsuba_endo.solve.inference.covariance import uncertainty
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.smoothing import smooth_surfaces
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.surfaces.lattice import Lattice
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import Lattice
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import Rig, bumpy_sheet, lopsided_camera, random_rig, with_noise, with_outliers
 from tests.solve.problems import NOISE, errors, problem_of, small_rig

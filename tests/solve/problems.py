@@ -13,8 +13,8 @@ from mitsuba_endo.initialisation.result import Start
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.rig import Rig as RigFile
-from mitsuba_endo.solve.costs.problem import Problem
-from mitsuba_endo.solve.frames.single import separate_surfaces
+from mitsuba_endo.solve.costs.objective import Problem
+from mitsuba_endo.solve.frames.separate_surfaces import separate_surfaces
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
 from mitsuba_endo.solve.options import Options

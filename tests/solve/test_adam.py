@@ -9,9 +9,9 @@ from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Focal, Projector, Rig
 from mitsuba_endo.records.solution import Outcome
 from mitsuba_endo.solve.costs.noise_scale import NoiseScale
-from mitsuba_endo.solve.costs.problem import evaluate, gradient
-from mitsuba_endo.solve.frames.initialisation import start_frame
-from mitsuba_endo.solve.frames.single import separate_surfaces
+from mitsuba_endo.solve.costs.objective import evaluate, gradient
+from mitsuba_endo.solve.frames.initial_poses import start_frame
+from mitsuba_endo.solve.frames.separate_surfaces import separate_surfaces
 from mitsuba_endo.solve.minimisers.adam import Moments
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.options import Options

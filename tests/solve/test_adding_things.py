@@ -21,19 +21,19 @@ from mitsuba_endo.geometry.transforms import rotation_angle
 from mitsuba_endo.records import sharing
 from mitsuba_endo.records.rig import Rig
 from mitsuba_endo.records.solution import Outcome
-from mitsuba_endo.rendering.coordinates import FrameModel
 from mitsuba_endo.rendering.mitsuba_modules import dr, mi
 from mitsuba_endo.rendering.moving_mesh import vector
+from mitsuba_endo.rendering.projector_coordinates import FrameModel
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.costs.problem import make_problem
+from mitsuba_endo.solve.costs.objective import make_problem
 from mitsuba_endo.solve.costs.registry import PRIORS, register_prior
 from mitsuba_endo.solve.costs.smoothness import smoothness
 from mitsuba_endo.solve.costs.term import ResidualTerm
 from mitsuba_endo.solve.minimisers.levenberg_marquardt import LevenbergMarquardt
 from mitsuba_endo.solve.minimisers.minimise import MINIMISERS, minimise, register_minimiser
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.surfaces.hinges import hinge_operator
-from mitsuba_endo.solve.surfaces.lattice import Lattice
+from mitsuba_endo.solve.surfaces.edge_bending import bending_operator
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import Lattice
 from mitsuba_endo.solve.surfaces.registry import SURFACES, register_surface
 from mitsuba_endo.solve.surfaces.surface import Bending, Surface
 from mitsuba_endo.solve.unknowns.block import BLOCKS, Floats, VectorBlock, register_block
@@ -167,7 +167,7 @@ def test_a_surface() -> None:
             return value * dr.gather(mi.Vector3d, vector(self.directions), vertex, active)
 
         def bending(self, disparity: float) -> Bending:
-            K, _ = hinge_operator(self.directions, self.faces)
+            K, _ = bending_operator(self.directions, self.faces)
             return Bending((K * (disparity / 150)).tocsr())
 
         def bridges(self, values: Floats) -> NDArray[np.bool_]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from mitsuba_endo.solve.elimination.banded import BandedCholesky
+from mitsuba_endo.solve.elimination.banded_cholesky import BandedCholesky
 
 
 def banded(n: int, width: int, seed: int = 0) -> np.ndarray:

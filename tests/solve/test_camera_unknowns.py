@@ -10,7 +10,7 @@ from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.validation import validate
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.costs.gaussian_prior import GaussianPriorTerm
-from mitsuba_endo.solve.costs.problem import evaluate
+from mitsuba_endo.solve.costs.objective import evaluate
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.layout import make_layout
 from tests.rigs import cast, lopsided_fisheye, with_noise

@@ -14,7 +14,7 @@ from mitsuba_endo.solve.costs.drift import DriftTerm, drift, step_between
 from mitsuba_endo.solve.costs.noise_scale import NoiseScale
 from mitsuba_endo.solve.costs.registry import priors_of
 from mitsuba_endo.solve.costs.term import Gradient
-from mitsuba_endo.solve.elimination.normal import NormalEquations
+from mitsuba_endo.solve.elimination.normal_equations import NormalEquations
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
 from mitsuba_endo.solve.unknowns.state import State

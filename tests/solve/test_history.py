@@ -6,7 +6,7 @@ import pytest
 from mitsuba_endo.records.calibration import Snapshot
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.inference.covariance import shared_modes
-from mitsuba_endo.solve.surfaces.lattice import lattice_over
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import lattice_over
 from tests.rigs import with_noise
 from tests.solve.monte_carlo import FIELD
 from tests.solve.problems import NOISE, map_of, rig_file, small_rig

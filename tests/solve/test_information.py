@@ -5,7 +5,7 @@ import pytest
 
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.inference.information import Information, without_false_information
+from mitsuba_endo.solve.inference.sandwich_covariance import Information, without_false_information
 from tests.rigs import bumpy_sheet, plane, with_noise
 from tests.solve.problems import NOISE, SHEET, map_of, rig_file, small_rig
 

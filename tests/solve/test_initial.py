@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.solve.frames.initial import (
+from mitsuba_endo.solve.frames.initial_state import (
     MAX_VERTICES,
     PER_VERTEX,
     cell_size,
@@ -14,7 +14,7 @@ from mitsuba_endo.solve.frames.initial import (
     smooth_samples,
     whitening,
 )
-from mitsuba_endo.solve.surfaces.lattice import lattice_over
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import lattice_over
 from tests.rigs import lopsided_camera
 from tests.solve.problems import SHEET, small_rig
 

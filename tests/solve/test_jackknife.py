@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_endo.solve.elimination.normal import NormalEquations
+from mitsuba_endo.solve.elimination.normal_equations import NormalEquations
 from mitsuba_endo.solve.inference import jackknife
 from mitsuba_endo.solve.inference.response import response
 from mitsuba_endo.solve.job import Job

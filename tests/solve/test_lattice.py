@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.surfaces.lattice import (
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import (
     Lattice,
     equidistant_coordinates,
     equidistant_direction,

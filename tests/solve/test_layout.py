@@ -10,8 +10,8 @@ from mitsuba_endo.geometry.cameras import CAMERAS
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.consistency import MIN_CORRESPONDENCES
 from mitsuba_endo.records.rig import MAX_PROJECTOR_DISTORTION, Camera
-from mitsuba_endo.solve.costs.problem import make_problem
-from mitsuba_endo.solve.surfaces.lattice import Lattice, lattice_over
+from mitsuba_endo.solve.costs.objective import make_problem
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import Lattice, lattice_over
 from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout
 from mitsuba_endo.solve.unknowns.state import State

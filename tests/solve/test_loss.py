@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.solve.costs.loss import LOSSES
 from mitsuba_endo.solve.costs.noise_scale import NoiseScale
+from mitsuba_endo.solve.costs.robust_loss import LOSSES
 
 
 @pytest.mark.parametrize("name", LOSSES)

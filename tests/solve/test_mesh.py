@@ -12,15 +12,15 @@ from mitsuba_endo.fusion import FusedMesh
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.solve import pipeline
 from mitsuba_endo.solve.calibrate import calibrate
-from mitsuba_endo.solve.costs.problem import Problem, evaluate, make_problem
+from mitsuba_endo.solve.costs.objective import Problem, evaluate, make_problem
 from mitsuba_endo.solve.costs.smoothness import smoothness
 from mitsuba_endo.solve.frames.edge_lengths import edge_lengths
 from mitsuba_endo.solve.frames.joint import joint_problem
 from mitsuba_endo.solve.inference.fit import FrameSolution
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.surfaces.hinges import hinge_operator
-from mitsuba_endo.solve.surfaces.lattice import Lattice, lattice_over
-from mitsuba_endo.solve.surfaces.mesh import TriangleMesh, triangle_mesh
+from mitsuba_endo.solve.surfaces.edge_bending import bending_operator
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import Lattice, lattice_over
+from mitsuba_endo.solve.surfaces.triangle_mesh import TriangleMesh, triangle_mesh
 from mitsuba_endo.solve.unknowns.state import State
 from scripts.benchmarks.frames import make_frames, sheet_distances
 from scripts.benchmarks.joint import errors
@@ -58,7 +58,7 @@ class TestHinges:
         """Oracle: second differences of an affine function."""
         vertices, faces = lopsided()
         flat = vertices * (12 / (vertices @ [0.2, -0.1, 1.0]))[:, None]
-        K, corners = hinge_operator(flat, faces)
+        K, corners = bending_operator(flat, faces)
         assert np.abs(K @ (flat @ [1.0, -2.0, 0.5] + 3)).max() < 1e-11
         inner = 3 * len(faces) - len(np.unique(np.sort(_edges(faces), axis=1), axis=0))
         assert K.shape == (inner, len(vertices))
@@ -67,7 +67,7 @@ class TestHinges:
     def test_measure_the_bend_of_a_fold(self) -> None:
         """Oracle: two triangles of height 3 and 5 that meet at slopes 0.2 and -0.1 bend by 0.3."""
         vertices = np.array([[0.0, 0, 0], [0, 4, 0], [3, 1, 0.6], [-5, 2, 0.5]])
-        K, corners = hinge_operator(
+        K, corners = bending_operator(
             np.c_[vertices[:, :2], np.zeros(4)], np.array([[0, 1, 2], [1, 0, 3]])
         )
         assert sorted(corners[0].tolist()) == [0, 1, 2, 3]
@@ -83,7 +83,7 @@ class TestTriangleMesh:
         np.testing.assert_allclose(mesh.anchors, vertices[order])
         values = np.random.default_rng(1).normal(0, 0.1, mesh.size)
         bending = mesh.bending(100.0)
-        K, corners = hinge_operator(mesh.anchors, mesh.faces)
+        K, corners = bending_operator(mesh.anchors, mesh.faces)
         moved = K @ mesh.vertices(values)
         scale = 100.0 / mesh.distances[corners].mean(1) ** 2
         along = np.einsum("ec,ec->e", moved, mesh._edge_normals(corners))

@@ -5,11 +5,11 @@ import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.solve.costs.noise_scale import NoiseScale
-from mitsuba_endo.solve.costs.problem import Problem, evaluate, make_problem
+from mitsuba_endo.solve.costs.objective import Problem, evaluate, make_problem
 from mitsuba_endo.solve.costs.term import Gradient
-from mitsuba_endo.solve.elimination.normal import NormalEquations
+from mitsuba_endo.solve.elimination.normal_equations import NormalEquations
 from mitsuba_endo.solve.options import Options
-from mitsuba_endo.solve.surfaces.lattice import lattice_over
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import lattice_over
 from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.layout import make_layout
 from mitsuba_endo.solve.unknowns.state import State

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.solve.costs.coordinates import CoordinateTerm
+from mitsuba_endo.solve.costs.coordinate_residual import CoordinateTerm
 from mitsuba_endo.solve.costs.noise_scale import NoiseScale
-from mitsuba_endo.solve.costs.problem import Evaluation, Problem, evaluate, gradient
+from mitsuba_endo.solve.costs.objective import Evaluation, Problem, evaluate, gradient
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import with_noise, with_outliers
 from tests.solve.problems import PROJECTION_MODELS, problem_of, small_rig

@@ -10,8 +10,8 @@ from mitsuba_endo.geometry.distortion import BrownDistortion
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.rig import Camera
-from mitsuba_endo.solve.costs.renderer import FrameRenderer, SurfaceScene
-from mitsuba_endo.solve.surfaces.lattice import lattice_over
+from mitsuba_endo.solve.costs.differentiable_renderer import FrameRenderer, SurfaceScene
+from mitsuba_endo.solve.surfaces.inverse_range_lattice import lattice_over
 from mitsuba_endo.solve.unknowns.block import BLOCKS
 from mitsuba_endo.solve.unknowns.gauge import Gauge
 from mitsuba_endo.solve.unknowns.layout import Layout, make_layout

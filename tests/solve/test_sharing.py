@@ -88,7 +88,7 @@ def test_pose_without_focal_length_is_where_to_begin(monkeypatch: pytest.MonkeyP
     turned = rig.projector_from_camera.perturbed(np.array([0.01, -0.01, 0.01, 0.1, 0.1, -0.1]))
     pose = {"R": turned.R.tolist(), "t": turned.t.tolist()}
     given = rig_file(rig, projector={"pose": pose})
-    monkeypatch.setattr("mitsuba_endo.solve.frames.initialisation.search_start", None)
+    monkeypatch.setattr("mitsuba_endo.solve.frames.initial_poses.search_start", None)
     found = calibrate([map_of(rig)], given, QUICK).solution
     std = found.projector.focal.std
     assert isinstance(std, float)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .loss import LOSSES, Loss
+from .robust_loss import LOSSES, Loss
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elimination.normal import NormalEquations
+from ..elimination.normal_equations import NormalEquations
 from ..surfaces.surface import Bending, Surface
 from ..unknowns.state import State
 from .noise_scale import NoiseScale

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elimination.normal import NormalEquations
+from ..elimination.normal_equations import NormalEquations
 from ..unknowns.block import BLOCKS
 from ..unknowns.layout import Layout
 from ..unknowns.state import State

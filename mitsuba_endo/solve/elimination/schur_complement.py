@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .banded import BandedCholesky
+from .banded_cholesky import BandedCholesky
 from .coupling import Coupling
 
 _RANK = 1e-12

@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from ...geometry.transforms import RigidTransform
 from ...initialisation.registration import Registration
 from ...records.rig import Rig
-from ..costs.problem import Problem, make_problem
+from ..costs.objective import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import prior_weight, smoothness
 from ..inference.fit import FrameSolution
 from ..minimisers.result import OptimisationResult
-from ..surfaces.lattice import Lattice, lattice_over
+from ..surfaces.inverse_range_lattice import Lattice, lattice_over
 from ..unknowns.block import BLOCKS, Value
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .initial import initial_rho
+from .initial_state import initial_rho
 
 MARGIN = 3
 """Cells added around what the frames see: small steps of the cameras then stay on the surface."""

@@ -16,11 +16,11 @@ from ...fusion.remesh import remesh
 from ...geometry.cameras import CameraModel
 from ...initialisation.registration import Registration
 from ...records.rig import Rig
-from ..costs.problem import Problem, make_problem
+from ..costs.objective import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import prior_weight, smoothness
 from ..inference.fit import FrameSolution
-from ..surfaces.mesh import triangle_mesh
+from ..surfaces.triangle_mesh import triangle_mesh
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
 from .edge_lengths import edge_lengths

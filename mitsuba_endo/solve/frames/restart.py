@@ -6,20 +6,20 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
-from ...initialisation.clean import clean_map, noise_scale
+from ...initialisation.alternative_poses import AlternativePose
 from ...initialisation.given_pose import known_start
+from ...initialisation.outlier_rejection import clean_map, noise_scale
 from ...initialisation.result import Start
-from ...initialisation.rivals import Rival
 from ...records.correspondence import CorrespondenceMap
 from ...records.solution import Outcome
-from ..inference.alternatives import superior
+from ..inference.alternative_solutions import superior
 from ..inference.model_choice import cheaper
 from ..minimisers.result import OptimisationResult
 
 _EXPLAINED = 1.5
 """Residuals within this many times the maps' own noise need no better calibration."""
 _RESTARTS = 3
-"""Restarts in a row, each from the rival of the last."""
+"""Restarts in a row, each from the alternative of the last."""
 
 Solve = Callable[[Sequence[Start]], OptimisationResult]
 
@@ -68,12 +68,12 @@ def _restarted(
     camera: CameraModel,
     result: OptimisationResult,
 ) -> list[Start] | None:
-    """Return starts at the rivals that fit better, None if there is none."""
-    best: dict[int, Rival] = {}
-    for frames, rival in superior(result):
+    """Return starts at the alternatives that fit better, None if there is none."""
+    best: dict[int, AlternativePose] = {}
+    for frames, alternative in superior(result):
         for k in frames:
-            if k not in best or rival.cost_ratio < best[k].cost_ratio:
-                best[k] = rival
+            if k not in best or alternative.cost_ratio < best[k].cost_ratio:
+                best[k] = alternative
     if not best:
         return None
     try:
@@ -87,6 +87,8 @@ def _restarted(
     return again if all(start.used.any() for start in again) else None
 
 
-def _at(map_: CorrespondenceMap, start: Start, camera: CameraModel, rival: Rival) -> Start:
-    projector = start.projector.with_(focal=rival.focal)
-    return known_start(map_.q, camera, projector, rival.projector_from_camera)
+def _at(
+    map_: CorrespondenceMap, start: Start, camera: CameraModel, alternative: AlternativePose
+) -> Start:
+    projector = start.projector.with_(focal=alternative.focal)
+    return known_start(map_.q, camera, projector, alternative.projector_from_camera)

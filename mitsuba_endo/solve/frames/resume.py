@@ -11,7 +11,7 @@ from ...geometry.transforms import RigidTransform
 from ...records.checkpoint import Checkpoint, SurfaceRecord
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
-from ..costs.problem import Problem, make_problem
+from ..costs.objective import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import smoothness
 from ..minimisers.result import OptimisationResult
@@ -19,7 +19,7 @@ from ..surfaces.registry import SURFACES
 from ..unknowns.block import BLOCKS, PoseBlock, Value
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .initial import observations
+from .initial_state import observations
 
 
 def checkpoint_of(result: OptimisationResult) -> Checkpoint:

@@ -6,14 +6,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..elimination.banded import BandedCholesky
+from ..elimination.banded_cholesky import BandedCholesky
 from ..elimination.coupling import Coupling
-from ..elimination.normal import NormalEquations
+from ..elimination.normal_equations import NormalEquations
 from ..elimination.schur_complement import Reduced
 from ..minimisers.result import OptimisationResult
-from .information import data_information
 from .jackknife import jackknives
 from .response import response
+from .sandwich_covariance import data_information
 
 MODES = 6
 """Directions kept of what a calibration's error does to a surface."""

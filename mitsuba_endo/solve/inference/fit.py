@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ...records.calibration import Snapshot
 from ...records.correspondence import CorrespondenceMap
 from ...records.solution import LeftOut
-from ..costs.coordinates import Observations
-from ..costs.problem import Problem
+from ..costs.coordinate_residual import Observations
+from ..costs.objective import Problem
 from ..minimisers.result import OptimisationResult
 from ..unknowns.state import State
 from .covariance import Uncertainty

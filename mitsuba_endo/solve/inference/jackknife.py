@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elimination.normal import NormalEquations, surface_rows
+from ..elimination.normal_equations import NormalEquations, surface_rows
 from ..elimination.schur_complement import Reduced
 from ..minimisers.result import OptimisationResult
 from .response import response

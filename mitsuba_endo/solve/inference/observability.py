@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...records.solution import Status
-from ..costs.problem import Problem
+from ..costs.objective import Problem
 from ..unknowns.block import BLOCKS, NaturalScales
 from ..unknowns.layout import Layout
 from ..unknowns.state import State

@@ -5,10 +5,10 @@ counts neither regularisers nor noise as information and replaces it.
 """
 
 from ..costs.noise_scale import NoiseScale
-from ..costs.problem import Problem, evaluate
+from ..costs.objective import Problem, evaluate
 from ..unknowns.state import State
-from .information import inverse_information
 from .observability import Direction, free_directions, problem_unknowns
+from .sandwich_covariance import inverse_information
 
 
 def predicted_directions(problem: Problem, state: State, last_loss: str) -> list[Direction]:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elimination.banded import BandedCholesky
+from ..elimination.banded_cholesky import BandedCholesky
 from ..elimination.coupling import Coupling
 
 _COLUMNS = 32

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
 from ..costs.noise_scale import STEADY, NoiseScale
-from ..costs.problem import Evaluation, Problem, evaluate, gradient
+from ..costs.objective import Evaluation, Problem, evaluate, gradient
 from ..options import Options
 from ..unknowns.block import BLOCKS
 from ..unknowns.state import State

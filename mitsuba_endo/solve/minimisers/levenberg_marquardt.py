@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
 from ..costs.noise_scale import STEADY, NoiseScale
-from ..costs.problem import Evaluation, Problem, evaluate
-from ..elimination.normal import NormalEquations
+from ..costs.objective import Evaluation, Problem, evaluate
+from ..elimination.normal_equations import NormalEquations
 from ..options import Options
 from ..unknowns.state import State
 from .damping import FLOOR, Damping

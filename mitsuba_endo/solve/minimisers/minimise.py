@@ -7,7 +7,7 @@ from ...errors import InputError
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
 from ..costs.noise_scale import NoiseScale
-from ..costs.problem import Evaluation, Problem
+from ..costs.objective import Evaluation, Problem
 from ..options import Options
 from ..unknowns.state import State
 from .result import OptimisationResult

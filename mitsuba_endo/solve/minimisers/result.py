@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...records.calibration import TraceRow
 from ...records.solution import Outcome
 from ..costs.noise_scale import NoiseScale
-from ..costs.problem import Evaluation, Problem
-from ..elimination.normal import NormalEquations
+from ..costs.objective import Evaluation, Problem
+from ..elimination.normal_equations import NormalEquations
 from ..unknowns.state import State
 
 USED_WEIGHT = 0.1

@@ -7,7 +7,7 @@ shape. So calibration uses a weak prior, and the surface is smoothed afterwards,
 from dataclasses import replace
 
 from ..costs.noise_scale import NoiseScale
-from ..costs.problem import Problem, evaluate
+from ..costs.objective import Problem, evaluate
 from ..costs.smoothness import SmoothnessTerm, prior_weight
 from ..options import Options
 from .levenberg_marquardt import LevenbergMarquardt

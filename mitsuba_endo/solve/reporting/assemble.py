@@ -14,11 +14,11 @@ from ...records.rig import Camera, Rig
 from ...records.solution import Alternative, Estimate, Frame, ProjectorEstimate, Solution
 from ...sanity.working_distance import working_distance
 from ..frames.resume import checkpoint_of
-from ..inference.alternatives import alternative
+from ..inference.alternative_solutions import describe_alternative
 from ..inference.fit import Fit
 from ..inference.observability import correlation, describe
 from ..inference.period_errors import count_period_errors
-from ..minimisers.rendered import Rendering, render_frames
+from ..minimisers.render_result import Rendering, render_frames
 from ..minimisers.result import USED_WEIGHT
 from ..options import Options
 from ..unknowns.block import BLOCKS, VectorBlock
@@ -104,13 +104,13 @@ def _implausible_scale(fit: Fit, unit: Unit, renderings: list[Rendering], rig: R
 def _alternatives(estimates: Estimates) -> list[Alternative]:
     fit = estimates.fit
     return [
-        alternative(
-            rival,
+        describe_alternative(
+            alternative,
             [fit.maps[k].name for k in frames],
             estimates.unit.pose(fit.state.at("projector_pose", frames[0])),
             fit.state.focals[frames[0]],
         )
-        for frames, rival in estimates.rivals
+        for frames, alternative in estimates.alternatives
     ]
 
 

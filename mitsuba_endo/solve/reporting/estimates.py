@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.transforms import RigidTransform
-from ...initialisation.rivals import Rival
+from ...initialisation.alternative_poses import AlternativePose
 from ...records.solution import Estimate, Outcome, PoseEstimate, Status
-from ..inference.alternatives import AMBIGUOUS, ambiguities
+from ..inference.alternative_solutions import AMBIGUOUS, ambiguities
 from ..inference.fit import Fit
 from ..inference.model_error.analysis import with_effect
 from ..inference.observability import (
@@ -76,7 +76,7 @@ class Estimates:
         return free_directions(self.covariance, self.names)
 
     @cached_property
-    def rivals(self) -> list[tuple[list[int], Rival]]:
+    def alternatives(self) -> list[tuple[list[int], AlternativePose]]:
         """Other projector poses that fit, with their frames."""
         determined = [
             all(
@@ -166,7 +166,9 @@ class Estimates:
 
     def _ambiguous(self, frame: int) -> bool:
         """Tell whether the residuals cannot choose between this frame's pose and another."""
-        return any(frame in frames and not rival.decided for frames, rival in self.rivals)
+        return any(
+            frame in frames and not alternative.decided for frames, alternative in self.alternatives
+        )
 
     def _reason(self, name: str, frame: int, slot: slice) -> str:
         """Say why a block is not measured, and what would help."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
-from ...initialisation.clean import median_filter
+from ...initialisation.outlier_rejection import median_filter
 from ...records.correspondence import CorrespondenceMap
 
 _SMALL_SHARE = 0.02

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from ...records.calibration import FrameMaps, SurfaceEstimate
 from ..inference.covariance import shared_modes
 from ..inference.fit import Fit
-from ..minimisers.rendered import Rendering, seen_faces
+from ..minimisers.render_result import Rendering, seen_faces
 
 
 def surface_estimate(fit: Fit, surface: int, factor: float, inflation: float) -> SurfaceEstimate:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...geometry.cameras import CameraModel
 from ...records.solution import Outcome
-from ..minimisers.rendered import Rendering
+from ..minimisers.render_result import Rendering
 from .estimates import Estimates, listed
 from .model_section import model_warnings
 from .redundancy import FrameView, redundancy_warnings

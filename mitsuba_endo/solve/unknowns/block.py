@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from ...geometry.transforms import RigidTransform, rotation_from_vector
 from ...records.rig import Rig, Sharing, register_sharing
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 
 Value = Any
 """What a block holds: a :class:`RigidTransform`, or an array (n,)."""
@@ -90,7 +90,7 @@ class Block(ABC):
 
         Args:
             model: of the frame.
-            value: a :class:`RigidTransform` or :class:`~mitsuba_endo.rendering.coordinates.Pose`,
+            value: a :class:`RigidTransform`, or a ``Pose`` of ``rendering.projector_coordinates``,
                 or a list of components, of NumPy or of Dr.Jit.
         """
 

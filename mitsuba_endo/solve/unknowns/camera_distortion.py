@@ -7,7 +7,7 @@ import numpy as np
 
 from ...geometry.cameras import CAMERAS
 from ...records.rig import Rig, Sharing
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, Value, VectorBlock, register_block
 
 _STD = {"k1": 0.005, "k2": 0.01, "p1": 0.001, "p2": 0.001}

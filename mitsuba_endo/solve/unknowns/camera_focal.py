@@ -8,7 +8,7 @@ import numpy as np
 
 from ...geometry.arrays import namespace
 from ...records.rig import Rig, Sharing
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, LogarithmBlock, Suspect, Value, register_block
 
 _FOCAL_STD, _ASPECT_STD = 0.003, 0.001

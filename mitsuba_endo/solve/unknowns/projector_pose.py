@@ -8,7 +8,7 @@ import numpy as np
 
 from ...geometry.transforms import RigidTransform
 from ...records.rig import Rig
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, NaturalScales, PoseBlock, Value, register_block
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...geometry.cameras import CameraModel
 from ...geometry.projection_models import ProjectorModel, projector_model
 from ...geometry.transforms import RigidTransform
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import BLOCKS, Value
 
 

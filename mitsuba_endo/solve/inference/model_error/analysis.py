@@ -11,7 +11,7 @@ from ....records.solution import Outcome
 from ...costs.term import ResidualTerm
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import Floats
-from ..information import inverse_information
+from ..sandwich_covariance import inverse_information
 from .candidates import ModelCandidate, Named, named
 from .extended import Extended, extend
 from .nuisance import Nuisance, doubtful, nuisance

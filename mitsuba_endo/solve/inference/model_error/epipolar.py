@@ -12,9 +12,15 @@ from numpy.typing import NDArray
 from ....geometry.cameras import CameraModel
 from ....geometry.projection_models import ProjectorModel
 from ....geometry.transforms import RigidTransform
-from ....initialisation.epipolar import Bearings, Residuals, bearings, pose_jacobian, residuals
-from ...costs.coordinates import Observations
-from ...costs.problem import Problem
+from ....initialisation.epipolar_residual import (
+    Bearings,
+    Residuals,
+    bearings,
+    pose_jacobian,
+    residuals,
+)
+from ...costs.coordinate_residual import Observations
+from ...costs.objective import Problem
 from ...unknowns.block import BLOCKS, PoseBlock
 from ...unknowns.layout import Layout
 from ...unknowns.state import State

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....records.rig import Rig, Share, Sharing
-from ...costs.coordinates import CoordinateTerm
+from ...costs.coordinate_residual import CoordinateTerm
 from ...costs.smoothness import SmoothnessTerm
 from ...elimination.linearisation import Linearisation
-from ...elimination.normal import NormalEquations
+from ...elimination.normal_equations import NormalEquations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout, make_layout

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ....geometry.projection_models import PROJECTION_MODELS
 from ....geometry.transforms import RigidTransform
 from ....initialisation.correspondences import Correspondences
-from ....initialisation.propose import propose
+from ....initialisation.relative_pose_ransac import propose
 from ....records.rig import Rig
 from ....robust import MAD_TO_STD
-from ...costs.coordinates import Observations
+from ...costs.coordinate_residual import Observations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout, make_layout

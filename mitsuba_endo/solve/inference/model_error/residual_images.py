@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ....model_error.design_effect import DesignEffect, design_effect
 from ....model_error.structure import SMOOTHING_PX, Structure, structure
-from ...costs.coordinates import Observations
+from ...costs.coordinate_residual import Observations
 from ...minimisers.result import OptimisationResult
 
 Floats = NDArray[np.float64]

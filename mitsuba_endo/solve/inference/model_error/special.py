@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....geometry.projection_models import PROJECTION_MODELS
-from ...costs.renderer import FrameRenderer
+from ...costs.differentiable_renderer import FrameRenderer
 from ...minimisers.result import OptimisationResult
 
 Floats = NDArray[np.float64]

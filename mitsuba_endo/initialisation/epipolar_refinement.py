@@ -13,7 +13,7 @@ from mitsuba_endo.geometry.transforms import (
 from mitsuba_endo.robust import robust_std
 
 from .correspondences import Correspondences
-from .epipolar import Bearings, Residuals, bearings, jacobian, residuals
+from .epipolar_residual import Bearings, Residuals, bearings, jacobian, residuals
 from .vectors import Vectors
 
 _OUT_OF_RANGE_PX = 1e3  # residual of a coordinate that the law cannot produce at the tried focal

@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...rendering.mitsuba_modules import dr, mi
 from ...rendering.moving_mesh import vector
-from .hinges import hinge_operator
+from .edge_bending import bending_operator
 from .registry import register_surface
 from .surface import Bending, Surface
 
@@ -78,7 +78,7 @@ class TriangleMesh(Surface):
         A vertex at distance r has the disparity f b / r; moving by d along n changes it by about
         f b d / r^2, whichever way n points.
         """
-        rows, corners = hinge_operator(self.anchors, self.faces)
+        rows, corners = bending_operator(self.anchors, self.faces)
         scale = disparity / self.distances[corners].mean(1) ** 2
         rows = sp.diags_array(scale) @ rows
         normals = self._edge_normals(corners)

@@ -22,7 +22,7 @@ from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
 from ..options import Options
 from ..unknowns.layout import Layout
-from .initialisation import start_frame
+from .initial_poses import start_frame
 
 MAX_FRAMES = 2
 """Frames that are looked at: each takes some 3 s, and one tells the height to a few pixels."""

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from ...geometry.cameras import CameraModel
 from ...rendering.mitsuba_modules import dr, mi
 from ..elimination.linearisation import Linearisation, whiten
-from ..elimination.normal import NormalEquations
+from ..elimination.normal_equations import NormalEquations
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
+from .differentiable_renderer import FrameRenderer
 from .noise_scale import NoiseScale
-from .renderer import FrameRenderer
 from .term import Gradient, Term
 
 Floats = NDArray[np.float64]

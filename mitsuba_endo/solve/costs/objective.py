@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ...geometry.cameras import CameraModel
 from ...geometry.projection_models import ProjectorModel
 from ..elimination.linearisation import Linearisation
-from ..elimination.normal import NormalEquations
+from ..elimination.normal_equations import NormalEquations
 from ..surfaces.surface import Surface
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .coordinates import CoordinateTerm, FrameResiduals, Observations
+from .coordinate_residual import CoordinateTerm, FrameResiduals, Observations
+from .differentiable_renderer import FrameRenderer, SurfaceScene
 from .noise_scale import NoiseScale, robust_noise
-from .renderer import FrameRenderer, SurfaceScene
 from .smoothness import SmoothnessTerm
 from .term import Gradient, Term
 

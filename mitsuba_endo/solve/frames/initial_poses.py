@@ -7,8 +7,8 @@ import numpy as np
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
 from ...geometry.projection_models import ProjectorModel
-from ...initialisation.clean import clean_map
 from ...initialisation.given_pose import known_start, start_at_pose
+from ...initialisation.outlier_rejection import clean_map
 from ...initialisation.plane import plane_start
 from ...initialisation.result import Candidate, Start
 from ...initialisation.search import search_start

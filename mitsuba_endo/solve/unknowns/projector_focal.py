@@ -7,7 +7,7 @@ import numpy as np
 
 from ...geometry.arrays import namespace
 from ...records.rig import Rig, Sharing
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, LogarithmBlock, register_block
 
 

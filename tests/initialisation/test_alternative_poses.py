@@ -1,4 +1,4 @@
-"""Rivals of a calibration. Oracle: the homography of the true plane, and the truth.
+"""Alternatives to a calibration. Oracle: the homography of the true plane, and the truth.
 
 A pose (R, t) explains a plane with homography H exactly if s H - R = t n^T for some scale s and
 some vector n: a matrix of rank one whose columns are parallel to t.
@@ -9,8 +9,8 @@ import pytest
 
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
+from mitsuba_endo.initialisation.alternative_poses import AlternativePose, alternative_poses
 from mitsuba_endo.initialisation.correspondences import gather
-from mitsuba_endo.initialisation.rivals import Rival, rivals
 from tests.rigs import Surface, bumpy_sheet, cast, lopsided_camera, plane, with_noise
 
 SIZE, CENTRE, FOCAL, NOISE = (512, 400), (250.0, 205.0), 500.0, 0.3
@@ -22,22 +22,24 @@ BESIDE = RigidTransform.of([0.05, -0.12, 0.03], [-6.2, 0.8, 0.9])
 """The other pose of a plane puts it behind a device."""
 
 
-def found(law: str, surface: Surface, pose: RigidTransform, *, free: bool = False) -> list[Rival]:
+def found(
+    law: str, surface: Surface, pose: RigidTransform, *, free: bool = False
+) -> list[AlternativePose]:
     rig = cast(lopsided_camera(), projector_model(law, FOCAL, CENTRE), SIZE, pose, surface)
     rig = with_noise(rig, NOISE, 0)
     data = gather(rig.q, np.isfinite(rig.q[..., 0]), rig.camera)
-    return rivals(
+    return alternative_poses(
         data, rig.projector, pose, refine_focal=free, noise_px=NOISE, width=rig.camera.width
     )
 
 
-def misfit(rival: RigidTransform, true: RigidTransform) -> float:
-    """Distance of the rival from the set of poses that explain the true plane, relative to H."""
+def misfit(alternative: RigidTransform, true: RigidTransform) -> float:
+    """Distance of a pose from the set of those that explain the true plane, relative to H."""
     n = np.array(NORMAL)
     H = true.R + np.outer(true.t, n) / (n[2] * DISTANCE)
     # Rows across t hold no n: there s H and R must agree.
-    across = np.linalg.svd(rival.t[None])[2][1:]
-    a, b = (across @ H).ravel(), (across @ rival.R).ravel()
+    across = np.linalg.svd(alternative.t[None])[2][1:]
+    a, b = (across @ H).ravel(), (across @ alternative.R).ravel()
     s = a @ b / (a @ a)
     return float(np.linalg.norm(s * a - b) / np.linalg.norm(b))
 
@@ -69,6 +71,6 @@ def test_depth_rejects_the_twin(law: str) -> None:
 
 
 @pytest.mark.parametrize("pose", [AHEAD, BESIDE])
-def test_relief_has_no_rivals(pose: RigidTransform) -> None:
+def test_relief_has_no_alternatives(pose: RigidTransform) -> None:
     """Oracle: relief of 5 mm determines the pose."""
     assert found("pinhole", bumpy_sheet(DISTANCE, (0.2, -0.1), 5, 3), pose, free=True) == []

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
-from ...rendering.coordinates import (
+from ...rendering.mitsuba_modules import dr, mi
+from ...rendering.moving_mesh import MovingMesh, vector
+from ...rendering.projector_coordinates import (
     FrameModel,
     Pose,
     camera_rays,
     project_along,
 )
-from ...rendering.mitsuba_modules import dr, mi
-from ...rendering.moving_mesh import MovingMesh, vector
 from ...rendering.ray_triangle import plane_distance
 from ..elimination.linearisation import Linearisation
 from ..surfaces.surface import Surface

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-def hinge_operator(
+def bending_operator(
     vertices: Floats, faces: NDArray[np.int64]
 ) -> tuple[sp.csr_array, NDArray[np.int64]]:
     """Return the bending of a mesh across its inner edges as a linear operator on positions.

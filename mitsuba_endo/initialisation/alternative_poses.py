@@ -21,21 +21,21 @@ from .choose import (
     robust_scale,
 )
 from .correspondences import Correspondences, spread_sample
+from .epipolar_refinement import EpipolarLoss, evaluate, minimise
 from .notes import is_planar
-from .propose import distinct, propose
-from .refine import EpipolarLoss, evaluate, minimise
+from .relative_pose_ransac import distinct, propose
 
 SAMPLE = 4000
 """Correspondences that are looked at; twins differ in all of them."""
 _PROPOSALS = 4
 """Poses that compete beside the given one. Chosen."""
 _FOCAL_FACTOR = 6.0
-"""By which a rival's focal length may be greater or smaller. Chosen: the ladder of proposals spans
+"""By which an alternative's focal length may differ. Chosen: the ladder of proposals spans
 a factor of 9."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class AlternativePose:
     """Another minimum of the epipolar cost."""
 
     projector_from_camera: RigidTransform
@@ -53,7 +53,7 @@ class Rival:
     """Whether the surface is nearly one plane under the given calibration."""
 
 
-def rivals(
+def alternative_poses(
     data: Correspondences,
     projector: ProjectorModel,
     pose: RigidTransform,
@@ -62,14 +62,14 @@ def rivals(
     noise_px: float,
     width: int,
     seed: int = 0,
-) -> list[Rival]:
-    """Return the rivals of a calibration, best first; most scenes have none.
+) -> list[AlternativePose]:
+    """Return the alternatives of a calibration, best first; most scenes have none.
 
     Args:
         data: correspondences that were used.
         projector: of the calibration.
         pose: projector_from_camera, any unit of length.
-        refine_focal: whether a rival may have another focal length.
+        refine_focal: whether an alternative may have another focal length.
         noise_px: standard deviation of one component of q, pattern pixels.
         width: of the map, pixels.
         seed: of the sample drawn.
@@ -91,7 +91,7 @@ def _rated(
     pose: RigidTransform,
     minima: list[Minimum],
     data: Correspondences,
-) -> list[Rival]:
+) -> list[AlternativePose]:
     """Compare the minima with the given calibration under one loss; drop itself and worse ones."""
     given = evaluate(pose, problem.projector, data)
     scale = robust_scale(given)
@@ -111,5 +111,9 @@ def _rated(
             continue
         found = m.candidate
         ratio = cost / lowest
-        out.append(Rival(found.projector_from_camera, found.focal, ratio, decided, better, planar))
+        out.append(
+            AlternativePose(
+                found.projector_from_camera, found.focal, ratio, decided, better, planar
+            )
+        )
     return sorted(out, key=lambda r: r.cost_ratio)

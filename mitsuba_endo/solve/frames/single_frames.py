@@ -12,14 +12,14 @@ from ...records.rig import Rig
 from ...records.solution import Outcome
 from ..inference.fit import FrameSolution
 from ..minimisers.minimise import minimise
-from ..minimisers.rendered import render_frames
+from ..minimisers.render_result import render_frames
 from ..minimisers.result import USED_WEIGHT, OptimisationResult
 from ..minimisers.smoothing import smooth_surfaces
 from ..options import Options
-from ..surfaces.lattice import Lattice
+from ..surfaces.inverse_range_lattice import Lattice
 from ..unknowns.layout import Layout
 from .restart import with_restarts
-from .single import separate_surfaces
+from .separate_surfaces import separate_surfaces
 
 
 def solve_alone(

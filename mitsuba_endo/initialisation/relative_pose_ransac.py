@@ -16,8 +16,8 @@ from mitsuba_endo.geometry.projection_models import ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform, angle_between, rotation_angle
 
 from .correspondences import Correspondences
-from .epipolar import Bearings, bearings, residuals
-from .refine import EpipolarLoss, evaluate
+from .epipolar_refinement import EpipolarLoss, evaluate
+from .epipolar_residual import Bearings, bearings, residuals
 from .triangulate import in_front
 from .vectors import Vectors
 

@@ -10,16 +10,16 @@ from ...geometry.transforms import RigidTransform
 from ...initialisation.result import Start
 from ...records.correspondence import CorrespondenceMap
 from ...records.rig import Rig
-from ..costs.coordinates import Observations
-from ..costs.problem import Problem, make_problem
+from ..costs.coordinate_residual import Observations
+from ..costs.objective import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import prior_weight, smoothness
 from ..options import Options
-from ..surfaces.lattice import Lattice, lattice_over
+from ..surfaces.inverse_range_lattice import Lattice, lattice_over
 from ..unknowns.block import Value
 from ..unknowns.layout import Layout
 from ..unknowns.state import State
-from .initial import cell_size, initial_rho, observations, smooth_samples
+from .initial_state import cell_size, initial_rho, observations, smooth_samples
 
 
 def separate_surfaces(

@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.transforms import RigidTransform, angle_between, rotation_angle
+from ...initialisation.alternative_poses import AlternativePose, alternative_poses
 from ...initialisation.correspondences import Correspondences
-from ...initialisation.rivals import Rival, rivals
 from ...records.solution import Alternative
 from ..minimisers.result import USED_WEIGHT, OptimisationResult
 from ..unknowns.layout import Layout
 
 AMBIGUOUS = "another pose explains the correspondences as well, see alternatives"
-"""Why a pose with an undecided rival is weak."""
+"""Why a pose with an undecided alternative is weak."""
 _REGION = 5.0
-"""A rival within this many standard deviations of the solution's pose is the same calibration."""
+"""A pose within this many standard deviations of the solution's is the same calibration."""
 _OTHER_FOCAL = 1e-4
 """Relative difference from which on an alternative's focal length is told: six digits are shown."""
 
@@ -25,8 +25,8 @@ def ambiguities(
     noise_px: float,
     covariance: NDArray[np.float64],
     determined: Sequence[bool],
-) -> list[tuple[list[int], Rival]]:
-    """Return the rivals of every projector pose with the frames that share it.
+) -> list[tuple[list[int], AlternativePose]]:
+    """Return the alternatives of every projector pose with the frames that share it.
 
     Frames that share one surface and have projector poses of their own are passed over: a pose
     of one that bends its plane away from the others' surface does not survive the joint solution.
@@ -36,62 +36,67 @@ def ambiguities(
         noise_px: of one coordinate, pattern pixels.
         covariance: (G, G) of its global unknowns.
         determined: for every frame, whether the data determine its projector pose; a family of
-            poses that fit is no rival but an unknown that is unobservable.
+            poses that fit is no alternative but an unknown that is unobservable.
     """
     out = []
     for frames in _groups(result.problem.layout):
         if determined[frames[0]]:
-            out += [(frames, rival) for rival in _distinct(result, noise_px, covariance, frames)]
+            out += [
+                (frames, alternative)
+                for alternative in _distinct(result, noise_px, covariance, frames)
+            ]
     return out
 
 
-def superior(result: OptimisationResult) -> list[tuple[list[int], Rival]]:
-    """Return the rivals that fit better than a result by more than noise makes, with their frames.
+def superior(result: OptimisationResult) -> list[tuple[list[int], AlternativePose]]:
+    """Return those that fit better than a result by more than noise makes, with their frames.
 
     They are sought only where residuals are larger than the noise of the maps explains.
     """
     out = []
     for frames in _groups(result.problem.layout):
-        found = _rivals(result, result.noise.sigma, frames)
-        out += [(frames, rival) for rival in found if rival.better]
+        found = _alternative_poses(result, result.noise.sigma, frames)
+        out += [(frames, alternative) for alternative in found if alternative.better]
     return out
 
 
-def alternative(rival: Rival, names: list[str], found: RigidTransform, focal: float) -> Alternative:
-    """Describe a rival for the solution.
+def describe_alternative(
+    alternative: AlternativePose, names: list[str], found: RigidTransform, focal: float
+) -> Alternative:
+    """Describe an alternative for the solution.
 
     Args:
-        rival: another calibration.
+        alternative: another calibration.
         names: of the frames that it concerns.
         found: the solution's pose in its own unit.
         focal: the solution's, pattern pixels.
     """
-    pose = rival.projector_from_camera
+    pose = alternative.projector_from_camera
     turned, moved = np.degrees(_distances(pose, found))
     kind = (
         "the other pose of a plane: the surface seen is nearly planar"
-        if rival.planar
+        if alternative.planar
         else "another minimum of the cost"
     )
     how = (
         "it fits better in a sample of the correspondences, but not with the surface"
-        if rival.better
-        else f"it fits {100 * (rival.cost_ratio - 1):.2g} % worse, more than noise makes"
-        if rival.decided
+        if alternative.better
+        else f"it fits {100 * (alternative.cost_ratio - 1):.2g} % worse, more than noise makes"
+        if alternative.decided
         else "it fits as well within the noise, so the residuals cannot choose"
     )
     other = (
-        f", focal length {rival.focal:.6g} px"
-        if abs(rival.focal / focal - 1) > _OTHER_FOCAL
+        f", focal length {alternative.focal:.6g} px"
+        if abs(alternative.focal / focal - 1) > _OTHER_FOCAL
         else ""
     )
     return Alternative(
         frames=names,
         R=pose.R.tolist(),
         t=(np.linalg.norm(found.t) * pose.t).tolist(),
-        focal=rival.focal,
-        cost_ratio=rival.cost_ratio,
-        decided=rival.decided,
+        focal=alternative.focal,
+        cost_ratio=alternative.cost_ratio,
+        decided=alternative.decided,
         reason=(
             f"{kind}; rotation {turned:.3g} and translation direction {moved:.3g} degrees away"
             f"{other}; {how}; a frame that sees relief, or a rough pose in the rig file, tells "
@@ -109,12 +114,14 @@ def _groups(layout: Layout) -> list[list[int]]:
     return [[k] for k in every] if own else []
 
 
-def _rivals(result: OptimisationResult, noise_px: float, frames: list[int]) -> list[Rival]:
+def _alternative_poses(
+    result: OptimisationResult, noise_px: float, frames: list[int]
+) -> list[AlternativePose]:
     problem, state, first = result.problem, result.state, frames[0]
     projector = problem.projector(state, first)
     if projector is None:  # the epipolar search knows plain models only
         return []
-    return rivals(
+    return alternative_poses(
         _correspondences(result, frames),
         projector,
         state.at("projector_pose", first),
@@ -129,14 +136,14 @@ def _distinct(
     noise_px: float,
     covariance: NDArray[np.float64],
     frames: list[int],
-) -> list[Rival]:
-    """Return the rivals that lie outside what the covariance allows the solution."""
+) -> list[AlternativePose]:
+    """Return the alternatives that lie outside what the covariance allows the solution."""
     pose = result.state.at("projector_pose", frames[0])
     slot = result.problem.layout.slot("projector_pose", frames[0])
     assert slot is not None  # groups hold poses that are unknowns
     std = np.sqrt(np.diag(covariance)[slot])
     region = _REGION * np.array([np.linalg.norm(std[:3]), np.linalg.norm(std[3:])])
-    found = _rivals(result, noise_px, frames)
+    found = _alternative_poses(result, noise_px, frames)
     return [r for r in found if (_distances(r.projector_from_camera, pose) > region).any()]
 
 

@@ -12,18 +12,18 @@ from .pattern_image import PatternImage
 from .windows import Windows
 
 ALIKE = 0.15
-"""Correlation of the pattern with itself from which a shift is a rival."""
+"""Correlation of the pattern with itself from which a shift is an alternative."""
 MOST = 8
-"""Rivals at most, the nearest: the neighbours in a grid."""
+"""Alternatives at most, the nearest: the neighbours in a grid."""
 FARTHEST = 0.125
-"""Share of the pattern's smaller side within which rivals are sought: farther slips do not happen
+"""Share of the pattern's smaller side within which they are sought: farther slips do not happen
 pixel by pixel."""
 WIDER = 2.0
 """Windows of the comparison over those of the regression: they must hold some of the code."""
 
 
 @lru_cache(8)
-def rival_shifts(pattern: PatternImage) -> NDArray[np.float32]:
+def alternative_shifts(pattern: PatternImage) -> NDArray[np.float32]:
     """Return the shifts (K, 2), pattern pixels, by which a pattern resembles itself.
 
     They are the nearest local maxima of its normalised autocorrelation, but for the middle. A
@@ -49,16 +49,16 @@ def rival_shifts(pattern: PatternImage) -> NDArray[np.float32]:
 
 
 def contest(frame: Comparison, refined: Refined) -> tuple[Image, Image]:
-    """Return how well image and pattern correlate (h, w) here, and at each cell's best rival.
+    """Return how well image and pattern correlate (h, w) here, and at each cell's best alternative.
 
-    The latter is -1 where there are no rivals.
+    The latter is -1 where there are no alternatives.
     """
     windows = Windows(frame.links, WIDER * frame.windows.sigma)
     weight = frame.usable / (DARK + np.maximum(refined.predicted, 0)) ** 2
     weight = _thinned(weight * robust_weight(frame, refined.predicted, refined.scale))
     light, q = _thinned(frame.view.light), _thinned(refined.q)
     sums = [_mean(weight), _mean(weight * light), _mean(weight * light * light)]
-    shifts = np.concatenate([np.zeros((1, 2), np.float32), rival_shifts(frame.pattern)])
+    shifts = np.concatenate([np.zeros((1, 2), np.float32), alternative_shifts(frame.pattern)])
     for shift in shifts:
         value = frame.pattern.brightness(q + shift, refined.blur)
         sums += [_mean(weight * value), _mean(weight * value**2), _mean(weight * value * light)]
@@ -66,8 +66,8 @@ def contest(frame: Comparison, refined: Refined) -> tuple[Image, Image]:
     found = [_correlation(*(m.of(0, i) for i in (0, 1, 2, 3 * k + 3, 3 * k + 4, 3 * k + 5)))
              for k in range(len(shifts))]  # fmt: skip
     best = np.max(found[1:], 0) if len(found) > 1 else np.full_like(found[0], -1)
-    own, rival = (c.reshape(windows.shape).astype(np.float32) for c in (found[0], best))
-    return own, rival
+    own, alternative = (c.reshape(windows.shape).astype(np.float32) for c in (found[0], best))
+    return own, alternative
 
 
 def _thinned(field: Image) -> Image:

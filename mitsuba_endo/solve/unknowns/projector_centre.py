@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...records.rig import Rig
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, NaturalScales, Value, VectorBlock, register_block
 
 _STD_PX = 3.0

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from ...geometry.cameras import CameraModel
 from ...initialisation.triangulate import smooth_depth
 from ...records.correspondence import CorrespondenceMap
-from ..costs.coordinates import Observations
-from ..surfaces.lattice import Lattice
+from ..costs.coordinate_residual import Observations
+from ..surfaces.inverse_range_lattice import Lattice
 
 PER_VERTEX = 9
 """Observations per surface vertex: cells of three pixels where every pixel is decoded."""

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from ..costs.problem import evaluate
+from ..costs.objective import evaluate
 from ..costs.term import ResidualTerm
-from ..elimination.normal import NormalEquations, surface_rows
+from ..elimination.normal_equations import NormalEquations, surface_rows
 from ..elimination.schur_complement import Reduced, SurfaceBlock
 from ..minimisers.result import OptimisationResult
 from ..unknowns.state import State

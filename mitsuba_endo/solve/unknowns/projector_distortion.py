@@ -7,7 +7,7 @@ import numpy as np
 
 from ...geometry.distortion import BrownDistortion
 from ...records.rig import Rig
-from ...rendering.coordinates import FrameModel
+from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, Value, VectorBlock, register_block
 
 _LEAST_TERMS = 2
