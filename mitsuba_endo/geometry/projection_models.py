@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, namespace
-from .distortion import BrownDistortion
+from .brown_distortion import BrownDistortion
 
 
 class ProjectionModel(Protocol):

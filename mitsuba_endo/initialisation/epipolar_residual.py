@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_endo.geometry.distortion import BrownDistortion
+from mitsuba_endo.geometry.brown_distortion import BrownDistortion
 from mitsuba_endo.geometry.projection_models import PROJECTION_MODELS, ProjectorModel
 from mitsuba_endo.geometry.transforms import RigidTransform, tangent_basis
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.distortion import BrownDistortion, FisheyeDistortion
+from mitsuba_endo.geometry.brown_distortion import BrownDistortion, FisheyeDistortion
 
 
 @pytest.mark.parametrize(

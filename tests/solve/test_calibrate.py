@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
+from mitsuba_endo.geometry.brown_distortion import BrownDistortion
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.distortion import BrownDistortion
 from mitsuba_endo.geometry.transforms import RigidTransform, rotation_angle
 from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import load_solution, save_solution

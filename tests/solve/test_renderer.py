@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitsuba_endo.geometry.brown_distortion import BrownDistortion
 from mitsuba_endo.geometry.cameras import CameraModel
-from mitsuba_endo.geometry.distortion import BrownDistortion
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.rig import Camera

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..arrays import Array, namespace
-from ..distortion import FisheyeDistortion
+from ..brown_distortion import FisheyeDistortion
 from .registry import register_camera
 
 

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...geometry.distortion import BrownDistortion
+from ...geometry.brown_distortion import BrownDistortion
 from ...records.rig import Rig
 from ...rendering.projector_coordinates import FrameModel
 from .block import Floats, Value, VectorBlock, register_block

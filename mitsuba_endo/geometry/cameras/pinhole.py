@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..arrays import Array, namespace
-from ..distortion import BrownDistortion
+from ..brown_distortion import BrownDistortion
 from .registry import MIN_COSINE, register_camera
 
 
