@@ -14,9 +14,9 @@ from .consistency import locally_consistent
 from .coordinate_noise import with_measured_noise
 from .fringes import fringe_coordinate, within
 from .plan import AXES, Axis, StackPlan
+from .row_chunks import inner_rows, strips, with_rows
 from .stack_images import Stack, StackSource, estimate_noise
 from .stripes import HALO, StripeReading, coarse_coordinate, fine_coordinate, read_bits
-from .strips import inner_rows, strips, with_rows
 
 MIN_CONTRAST = 0.03
 """Peak-to-peak contrast of a lit pixel, of full scale."""

@@ -114,7 +114,7 @@ def test_memory_of_42_photographs_of_16_megapixels(tmp_path: Path):
 
 def test_strips_and_reading_again_change_nothing(tmp_path: Path, monkeypatch):
     """Oracle: the same stack in memory and in one strip."""
-    from mitsuba_endo.decoding import strips
+    from mitsuba_endo.decoding import row_chunks
     from mitsuba_endo.decoding.stack import decode_stack
     from mitsuba_endo.decoding.stack_files import StackFiles, stack_paths
     from mitsuba_endo.decoding.stack_reading import StackRequest, find_reading
@@ -125,7 +125,7 @@ def test_strips_and_reading_again_change_nothing(tmp_path: Path, monkeypatch):
     whole = StackFiles(paths)
     reading = find_reading(whole, request)
     expected = decode_stack(whole, reading.plan, order=reading.order)
-    monkeypatch.setattr(strips, "STRIP_VALUES", 22 * 300 * 50)
+    monkeypatch.setattr(row_chunks, "STRIP_VALUES", 22 * 300 * 50)
     again = StackFiles(paths, memory=22 * 300 * 60)
     assert find_reading(again, request) == reading
     decoded = decode_stack(again, reading.plan, order=reading.order)
