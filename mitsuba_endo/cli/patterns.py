@@ -18,7 +18,7 @@ from .stack_options import (
 )
 
 if TYPE_CHECKING:
-    from ..decoding.plan import StackPlan
+    from ..decoding.stack_plan import StackPlan
 
 Projected = Annotated[
     str, typer.Option("--pattern", "--kind", help="gray, phase, gray+phase or coded.")

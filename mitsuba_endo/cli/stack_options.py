@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from ..decoding.plan import StackPlan
+    from ..decoding.stack_plan import StackPlan
 
 Kind = Annotated[str, typer.Option("--pattern", "--kind", help="gray, phase or gray+phase.")]
 Width = Annotated[int, typer.Option(help="Pattern width, pixels.")]
@@ -36,7 +36,7 @@ def make_plan(
     Raises:
         InputError: an option out of range, or one that this kind of stack has no use for.
     """
-    from ..decoding.plan import StackPlan
+    from ..decoding.stack_plan import StackPlan
 
     return StackPlan.make(
         kind, width, height, reference=reference, inverse=inverse, stripe=stripe,  # type: ignore[arg-type]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .phase_shift import wrapped_coordinate
-from .plan import Axis, StackPlan
+from .stack_plan import Axis, StackPlan
 
 Images = NDArray[np.floating]
 

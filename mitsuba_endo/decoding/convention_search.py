@@ -19,11 +19,11 @@ from .gray_code import Code, read_stripes, stripe_count
 from .gray_interpolation import edge_distances
 from .phase_search import periods_agree, phase_conventions
 from .phase_shift import PhaseConvention
-from .plan import AXES, Axis, StackPlan
 from .possible_plans import ONE_DIRECTION, PossiblePlans
 from .sample_map import AxisMap, SampleMap, joined
 from .stack import nothing_lit
 from .stack_images import StackSource
+from .stack_plan import AXES, Axis, StackPlan
 from .stack_samples import StackSamples, take_samples
 from .stripes import BIT_OVER_NOISE, CERTAIN, most_left_out, thirds
 

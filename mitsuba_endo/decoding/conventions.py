@@ -7,7 +7,7 @@ from typing import Literal, TypeVar
 
 from ..errors import InputError
 from .gray_code import Code
-from .plan import AXES, Axis, StackPlan
+from .stack_plan import AXES, Axis, StackPlan
 
 T = TypeVar("T")
 Inverses = Literal["none", "after", "before", "axis-last", "axis-first", "last", "first"]

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from .axis_images import AxisImages
 from .heterodyne import unwrap
 from .phase_shift import MAX_DEVIATION, phase_noise, refine, unroll_coarsest, wrapped_coordinate
-from .plan import Axis, StackPlan
+from .stack_plan import Axis, StackPlan
 
 
 def fringe_coordinate(

@@ -9,7 +9,7 @@ from .axis_images import AxisImages
 from .conventions import Stated
 from .heterodyne import bias, unwrap
 from .phase_shift import MAX_DEVIATION, PhaseConvention, refine, unroll_coarsest, wrapped_coordinate
-from .plan import AXES, Axis, StackPlan
+from .stack_plan import AXES, Axis, StackPlan
 from .stack_samples import StackSamples
 
 OFF_PHASE = 0.03

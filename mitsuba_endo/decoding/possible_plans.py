@@ -6,7 +6,7 @@ from itertools import product
 from typing import Any, get_args
 
 from ..errors import InputError
-from .plan import AXES, FINEST_PERIOD, STEPS, STRIPES, Kind, StackPlan
+from .stack_plan import AXES, FINEST_PERIOD, STEPS, STRIPES, Kind, StackPlan
 
 ONE_DIRECTION = (
     "if only columns or only rows were projected, project both: a point of the pattern has two "

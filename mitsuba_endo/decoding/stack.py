@@ -13,9 +13,9 @@ from .axis_images import axis_images, labels_needed
 from .consistency import locally_consistent
 from .coordinate_noise import with_measured_noise
 from .fringes import fringe_coordinate, within
-from .plan import AXES, Axis, StackPlan
 from .row_chunks import inner_rows, strips, with_rows
 from .stack_images import Stack, StackSource, estimate_noise
+from .stack_plan import AXES, Axis, StackPlan
 from .stripes import HALO, StripeReading, coarse_coordinate, fine_coordinate, read_bits
 
 MIN_CONTRAST = 0.03

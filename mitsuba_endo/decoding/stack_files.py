@@ -23,9 +23,9 @@ from .image_files import (
     open_image,
     read_image,
 )
-from .plan import STRIPES, Kind, StackPlan
 from .stack_images import Stack
 from .stack_patterns import patterns
+from .stack_plan import STRIPES, Kind, StackPlan
 
 _LABEL = re.compile(r"(?:[xy]_(?:gray\d+(?:_inverse)?|phase[\d.]+_step\d+)|white|black)$")
 MEMORY = 150_000_000

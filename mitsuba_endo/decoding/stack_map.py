@@ -6,9 +6,9 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..records.correspondence import CorrespondenceMap
-from .plan import Kind
 from .stack import decode_stack
 from .stack_files import StackFiles, stack_paths
+from .stack_plan import Kind
 from .stack_reading import StackReading, StackRequest, find_reading, read_by_names
 
 STACK = "stack"

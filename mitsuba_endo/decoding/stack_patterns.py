@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from .gray_code import bit_images
 from .phase_shift import phase_images
-from .plan import AXES, Axis, StackPlan
+from .stack_plan import AXES, Axis, StackPlan
 
 SWING = 0.98
 """Of projected phase images, of full scale: a perfect copy of them must not look saturated."""

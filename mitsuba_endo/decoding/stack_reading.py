@@ -8,11 +8,11 @@ from ..errors import InputError
 from .convention_search import find_convention
 from .conventions import NOTHING, OPTION, Stated, own_convention
 from .image_files import ImageSource
-from .plan import Kind, StackPlan
 from .possible_plans import PossiblePlans, possible_plans
 from .stack import CONTRAST_OVER_NOISE, MIN_CONTRAST
 from .stack_files import check_names, labelled_plan, labels_of
 from .stack_images import StackSource, estimate_noise
+from .stack_plan import Kind, StackPlan
 
 Reference = Literal["first", "last", "none"]
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .axis_images import AxisImages, axis_images, labels_needed
-from .plan import AXES, Axis, StackPlan
 from .sample_map import AxisMap
 from .stack_images import StackSource
+from .stack_plan import AXES, Axis, StackPlan
 
 TILE, TILES, STRIDE = 96, 12, 3
 """Pixels of a tile's side, tiles of an image, and pixels from one sample to the next: odd, or

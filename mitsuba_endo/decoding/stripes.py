@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from .axis_images import AxisImages
 from .gray_code import read_stripes, stripe_count
 from .gray_interpolation import ANYWHERE, EdgeDistances, edge_distances, place_within
-from .plan import Axis, StackPlan
+from .stack_plan import Axis, StackPlan
 
 READABLE = 0.2
 """Least amplitude of a bit, over the contrast, near a pixel. By hand: below, scattered light and

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from mitsuba_endo.capture.photograph import photograph
 from mitsuba_endo.capture.settings import CaptureSettings, Light, Tissue
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack import Stack, decode_stack
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.rendering.synthetic import MeshScene
 

@@ -12,10 +12,10 @@ from PIL import Image
 
 from mitsuba_endo.decoding.conventions import StackOrder, read_convention
 from mitsuba_endo.decoding.phase_shift import PhaseConvention
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack import decode_stack
 from mitsuba_endo.decoding.stack_files import StackFiles, stack_paths
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.decoding.stack_reading import StackRequest, find_reading, read_by_names
 
 from .case import REFUSED, RIGHT, Case, Ending, beside

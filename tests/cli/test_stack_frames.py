@@ -9,8 +9,8 @@ import yaml
 
 from mitsuba_endo.api.inputs import as_correspondences, as_rig
 from mitsuba_endo.decoding.conventions import StackOrder
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.solution import load_solution
 from tests.cli.inputs import run

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_endo.decoding.coordinate_noise import with_measured_noise
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack import DecodedStack, Stack, decode_stack
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.robust import robust_std
 from tests.decoding.captures import SIZE, View, inner, photograph, view
 

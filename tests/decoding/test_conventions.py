@@ -20,10 +20,10 @@ from mitsuba_endo.decoding.conventions import (
 )
 from mitsuba_endo.decoding.gray_code import Code
 from mitsuba_endo.decoding.phase_shift import PhaseConvention
-from mitsuba_endo.decoding.plan import STEPS, STRIPES, StackPlan
 from mitsuba_endo.decoding.possible_plans import possible_plans
 from mitsuba_endo.decoding.stack import Stack, decode_stack
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import STEPS, STRIPES, StackPlan
 from mitsuba_endo.decoding.stack_reading import StackReading, StackRequest, find_reading
 from mitsuba_endo.errors import InputError, NothingDecodedError
 from tests.decoding.captures import SIZE, View, inner, photograph, view

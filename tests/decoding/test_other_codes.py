@@ -6,9 +6,9 @@ import pytest
 from mitsuba_endo.decoding.gray_code import bit_images
 from mitsuba_endo.decoding.heterodyne import separation, unwrap
 from mitsuba_endo.decoding.phase_shift import PhaseConvention
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack import Stack, decode_stack
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.decoding.stack_reading import StackRequest, find_reading
 from mitsuba_endo.errors import InputError
 from tests.decoding.captures import SIZE, inner, photograph, view

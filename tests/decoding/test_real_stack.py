@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.records.correspondence import load_map
 from tests.cli.inputs import run
 

@@ -5,10 +5,10 @@ import pytest
 
 from mitsuba_endo.decoding.gray_code import bit_images, read_stripes
 from mitsuba_endo.decoding.phase_shift import phase_images, wrapped_coordinate
-from mitsuba_endo.decoding.plan import StackPlan
 from mitsuba_endo.decoding.stack import decode_stack
 from mitsuba_endo.decoding.stack_images import Stack, estimate_noise
 from mitsuba_endo.decoding.stack_patterns import patterns
+from mitsuba_endo.decoding.stack_plan import StackPlan
 from mitsuba_endo.errors import InputError, NothingDecodedError
 from mitsuba_endo.initialisation.search import search_start
 from tests.decoding.captures import SIZE, View, inner, photograph, view
