@@ -16,7 +16,7 @@ from .render import capture_scene
 from .report import write_report
 
 if TYPE_CHECKING:
-    from ..evaluate.metrics import Metrics
+    from ..evaluate.metrics_file import Metrics
     from ..records.solution import Solution
 
 Out = Annotated[Path, typer.Option("--out", help="Folder to write.")]

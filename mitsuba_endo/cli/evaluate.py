@@ -9,7 +9,7 @@ from .console import Debug, Json, Quiet, Session, session
 from .options import Result
 
 if TYPE_CHECKING:
-    from ..evaluate.metrics import Metrics
+    from ..evaluate.metrics_file import Metrics
     from ..evaluate.sequence_metrics import SequenceMetrics
 
 Truth = Annotated[Path, typer.Option("--truth", help="Truth file of the synthetic scene.")]
@@ -78,7 +78,7 @@ def result_files(path: Path) -> list[Path]:
 
 def report(metrics: "Metrics | SequenceMetrics", output: Session) -> None:
     """Print the errors with their units, and why some are missing."""
-    from ..evaluate.metrics import Metrics
+    from ..evaluate.metrics_file import Metrics
     from .summary import metrics_table, sequence_table
 
     single = isinstance(metrics, Metrics)

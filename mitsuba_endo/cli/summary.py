@@ -9,7 +9,7 @@ from ..records.solution import INTERVAL
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ..evaluate.metrics import Metrics
+    from ..evaluate.metrics_file import Metrics
     from ..evaluate.sequence_metrics import SequenceMetrics
     from ..records.solution import Estimate, PoseEstimate, Solution
 

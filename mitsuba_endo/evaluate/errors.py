@@ -8,8 +8,8 @@ from ..geometry.transforms import RigidTransform
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import Frame, Solution
 from ..records.surface import load_surface
-from .metric import Metric, rms
-from .metrics import FrameMetrics, Metrics
+from .metric_value import Metric, rms
+from .metrics_file import FrameMetrics, Metrics
 from .poses import (
     baseline_error,
     camera_errors,

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..geometry.transforms import RigidTransform, angle_between, rotation_angle
 from ..records.solution import Estimate, PoseEstimate
-from .metric import Metric
+from .metric_value import Metric
 
 
 def focal_error(solution: Estimate, truth: Estimate) -> Metric:

@@ -10,7 +10,7 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.evaluate.errors import evaluate, match_frames
-from mitsuba_endo.evaluate.metrics import Metrics
+from mitsuba_endo.evaluate.metrics_file import Metrics
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.rig import Camera

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.evaluate.metric import Metric, rms
+from mitsuba_endo.evaluate.metric_value import Metric, rms
 from mitsuba_endo.evaluate.poses import (
     baseline_error,
     camera_errors,
