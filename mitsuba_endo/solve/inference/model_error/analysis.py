@@ -15,10 +15,10 @@ from ..sandwich_covariance import inverse_information
 from .candidates import ModelCandidate, Named, named
 from .extended import Extended, extend
 from .nuisance import Nuisance, doubtful, nuisance
-from .plan import PlanTest, plan_tests
 from .refits import Refit, refits, worth_trying
 from .residual_images import Correlation
 from .score_tests import Tests, score_tests
+from .sharing_tests import PlanTest, plan_tests
 from .special import specials_of
 
 FALSE_ALARMS = 0.002

@@ -22,9 +22,9 @@ from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout, make_layout
 from ...unknowns.state import State
-from .epipolar import Look, along, derivatives, look, possible, thinned
+from .epipolar_fit import Look, along, derivatives, look, possible, thinned
 from .extended import freed, given_blocks, widened
-from .plan import alternatives
+from .sharing_tests import alternatives
 
 Floats = NDArray[np.float64]
 
