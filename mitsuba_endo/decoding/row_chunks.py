@@ -1,4 +1,4 @@
-"""Working through large images by strips of rows."""
+"""Working through large images by chunks of rows."""
 
 from collections.abc import Iterator
 from dataclasses import fields
@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-STRIP_VALUES = 12_000_000
-"""Pixels of all images of a strip together: an array of that size takes 48 MB."""
+CHUNK_VALUES = 12_000_000
+"""Pixels of all images of a chunk together: an array of that size takes 48 MB."""
 
 
-def strips(shape: tuple[int, int], images: int, halo: int = 0) -> Iterator[tuple[int, int]]:
-    """Yield first and last rows of strips that hold so many images in little memory.
+def row_chunks(shape: tuple[int, int], images: int, halo: int = 0) -> Iterator[tuple[int, int]]:
+    """Yield first and last rows of chunks that hold so many images in little memory.
 
     Args:
         shape: rows and columns.
@@ -20,7 +20,7 @@ def strips(shape: tuple[int, int], images: int, halo: int = 0) -> Iterator[tuple
         halo: rows needed beyond each end.
     """
     height, width = shape
-    most = max(1, STRIP_VALUES // (images * width) - 2 * halo)
+    most = max(1, CHUNK_VALUES // (images * width) - 2 * halo)
     edges = np.linspace(0, height, -(-height // most) + 1).astype(int).tolist()
     yield from pairwise(edges)
 

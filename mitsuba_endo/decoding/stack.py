@@ -13,7 +13,7 @@ from .axis_images import axis_images, labels_needed
 from .consistency import locally_consistent
 from .coordinate_noise import with_measured_noise
 from .fringes import fringe_coordinate, within
-from .row_chunks import inner_rows, strips, with_rows
+from .row_chunks import inner_rows, row_chunks, with_rows
 from .stack_images import Stack, StackSource, estimate_noise
 from .stack_plan import AXES, Axis, StackPlan
 from .stripes import HALO, StripeReading, coarse_coordinate, fine_coordinate, read_bits
@@ -141,7 +141,7 @@ def _check_reference(
     if not plan.reference:
         return
     brighter = darker = 0
-    for start, stop in strips(stack.shape, 2):
+    for start, stop in row_chunks(stack.shape, 2):
         white, black = stack.rows([place["white"], place["black"]], start, stop).images
         brighter += int((white - black >= need).sum())
         darker += int((black - white >= need).sum())
@@ -166,7 +166,7 @@ def _decode_axis(
     labels = labels_needed(plan, axis)
     light: _Light | None = None
     whole: Any = None
-    for start, stop in strips(stack.shape, len(labels), HALO):
+    for start, stop in row_chunks(stack.shape, len(labels), HALO):
         low, high = max(0, start - HALO), min(height, stop + HALO)
         strip = stack.rows([place[label] for label in labels], low, high)
         inner = slice(start - low, stop - low)

@@ -125,7 +125,7 @@ def test_strips_and_reading_again_change_nothing(tmp_path: Path, monkeypatch):
     whole = StackFiles(paths)
     reading = find_reading(whole, request)
     expected = decode_stack(whole, reading.plan, order=reading.order)
-    monkeypatch.setattr(row_chunks, "STRIP_VALUES", 22 * 300 * 50)
+    monkeypatch.setattr(row_chunks, "CHUNK_VALUES", 22 * 300 * 50)
     again = StackFiles(paths, memory=22 * 300 * 60)
     assert find_reading(again, request) == reading
     decoded = decode_stack(again, reading.plan, order=reading.order)
