@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "method.md").read_text("utf-8")
 TABLE = PAGE[PAGE.index("## Where each formula is") :]
@@ -54,3 +56,30 @@ def test_symbols_of_the_pages_equations_are_in_the_table() -> None:
     ):
         assert symbol in PAGE.split("## Where")[0]
         assert symbol in TABLE
+
+
+TERMS = {
+    "transforms": "Y = R", "projection_models": "projection models", "brown": "Brown",
+    "fisheye": "camera pixel", "ray_triangle": "meets a triangle",
+    "projector_coordinates": "R(S, C, P)", "inverse_range": r"X = d / \rho",
+    "triangle_mesh": "X = X^0", "edge_bending": "$b_j$ of a mesh",
+    "edge_length": "length of a mesh",
+    "tsdf": "truncated signed", "objective": "$E$", "noise_scale": r"$\sigma$ of one",
+    "coordinate_residual": r"L^{-1}(q - R)", "robust_loss": r"$\varrho$ and its weights",
+    "smoothness": r"\lambda \sum", "gaussian_prior": r"\bar v_m", "linearisation": "Jacobian",
+    "normal_equations": "$J^T W J$", "schur": r"(G - B^T A^{-1} B)", "cholesky": "banded Cholesky",
+    "damping": "damping", "adam": "step of Adam", "ransac": "five-point RANSAC",
+    "epipolar_residual": r"\partial e/\partial q", "triangulat": "range from two rays",
+    "icp": "point-to-plane", "sandwich": "simulation extrapolation", "jackknife": "jackknife",
+}  # fmt: skip
+"""Words that a textbook uses for what a row of the table computes."""
+
+
+@pytest.mark.parametrize("word", TERMS)
+def test_a_textbooks_word_leads_to_the_formula(word: str) -> None:
+    """Oracle: the folder tree: one file is called so, and it is the one of the table's row."""
+    package = ROOT / "mitsuba_endo"
+    called = [p.relative_to(package).as_posix() for p in package.rglob(f"*{word}*.py")]
+    assert len(called) == 1
+    (row,) = [files for formula, files in files_of(TABLE).items() if TERMS[word] in formula]
+    assert called[0] in row
