@@ -7,8 +7,8 @@ from typing import Any
 from ..decoding.masks import Masks
 from ..records.checkpoint import load_checkpoint
 from ..records.correspondence import CorrespondenceMap
-from ..records.plan import with_plan
 from ..records.rig import load_rig
+from ..records.sharing_plan import with_plan
 from ..refine.image_decoder import ImageDecoder
 from ..rendering.render import Capture, render_capture
 from ..rendering.scene import load_scene

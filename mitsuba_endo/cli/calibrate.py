@@ -237,7 +237,7 @@ def with_sharing(rig: "Rig", text: str) -> "Rig":
         InputError: not of the form block=mode, an unknown block or mode, or two for one block.
     """
     from ..errors import InputError
-    from ..records.plan import with_plan
+    from ..records.sharing_plan import with_plan
 
     plan: dict[str, str] = {}
     for item in text.split(","):
