@@ -1,4 +1,4 @@
-"""What is to be solved: terms over surfaces and the layout of the other unknowns."""
+"""The objective E: the sum of the terms, over surfaces and the layout of the other unknowns."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The starts of all frames: each alone, or one projector pose for all."""
+"""The initial poses of all frames: each alone, or one projector pose for all."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""What the observations alone say about the global unknowns.
+"""The sandwich covariance I^-1 V I^-1: what the observations alone say about the global unknowns.
 
 The Schur complement at the optimum holds two things that look like information and are none. The
 prior on the surface resists any deformation, also one that the data leave free (a pinhole

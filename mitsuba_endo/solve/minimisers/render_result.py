@@ -1,4 +1,4 @@
-"""What a result looks like: its seen surface, and its frames at every pixel."""
+"""Rendering a result: its seen surface, and its frames at every pixel."""
 
 from dataclasses import dataclass
 

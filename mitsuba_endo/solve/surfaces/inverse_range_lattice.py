@@ -1,4 +1,4 @@
-"""The surface as the solver sees it: vertices that slide along fixed directions.
+"""A lattice of inverse ranges as the surface: vertices that slide along fixed directions.
 
 Directions from one centre (the first camera's) lie on a square lattice of the equidistant map
 (a, b) = theta (cos phi, sin phi), theta being the angle to the z axis; it covers an image of any

@@ -12,7 +12,7 @@ from mitsuba_endo.solve.costs.objective import Evaluation, Problem, evaluate, gr
 from mitsuba_endo.solve.unknowns.state import State
 from tests.rigs import with_noise, with_outliers
 from tests.solve.problems import PROJECTION_MODELS, problem_of, small_rig
-from tests.solve.test_normal import problem as two_frames
+from tests.solve.test_normal_equations import problem as two_frames
 
 RIG = with_outliers(with_noise(small_rig("pinhole"), 0.3, 0), 0.05, 1)
 
