@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CAMERAS
-from ..geometry.cameras.pinhole import OpenCVCamera
+from ..geometry.cameras.brown_pinhole import OpenCVCamera
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Camera, Rig
 from .finding import Finding

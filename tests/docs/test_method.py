@@ -59,7 +59,7 @@ def test_symbols_of_the_pages_equations_are_in_the_table() -> None:
 
 
 TERMS = {
-    "transforms": "Y = R", "projection_models": "projection models", "brown": "Brown",
+    "transforms": "Y = R", "projection_models": "projection models", "brown_distortion": "Brown",
     "fisheye": "camera pixel", "ray_triangle": "meets a triangle",
     "projector_coordinates": "R(S, C, P)", "inverse_range": r"X = d / \rho",
     "triangle_mesh": "X = X^0", "edge_bending": "$b_j$ of a mesh",
