@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.cameras import CameraModel
+from ..geometry.endoscope import Endoscope
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..records.solution import Frame, PoseEstimate, Solution
+from ..records.ground_truth import GroundTruth, TrueFrame
 from .decoder_errors import like_decoded
 from .scene import LoadedScene
 from .synthetic import MeshScene
-from .truth import truth_of
 
 Floats = NDArray[np.float64]
 
@@ -64,17 +64,21 @@ class MovingCapture:
         ).q  # fmt: skip
         return like_decoded(q, size, self.noise, 0.0, 1000 * self.seed + k)
 
-    def truth(self) -> Solution:
+    def truth(self) -> GroundTruth:
         """Return the exact values of all frames; the world is the first camera."""
         frames = [
-            Frame(
-                name=self.name(k),
-                projector_from_camera=_exact(self.projector_from_camera(k)),
-                world_from_camera=_exact(self.first_from_camera[k]),
+            TrueFrame(
+                self.name(k),
+                Endoscope(
+                    self._camera,
+                    self.first_from_camera[k],
+                    self._projector,
+                    self.projector_from_camera(k),
+                ),
             )
             for k in range(len(self))
         ]
-        return truth_of(self.loaded).model_copy(update={"frames": frames})
+        return GroundTruth(frames, self.loaded.pattern_size())
 
     def surface(self) -> tuple[Floats, NDArray[np.int64]]:
         """Return vertices (V, 3) in the first camera's frame, mm, and faces (F, 3)."""
@@ -97,7 +101,3 @@ class MovingCapture:
     def _scene(self) -> MeshScene:
         mesh = self.loaded.surface()
         return MeshScene(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64))
-
-
-def _exact(pose: RigidTransform) -> PoseEstimate:
-    return PoseEstimate.of(pose, status="fixed")

@@ -1,6 +1,7 @@
 """The folder of a rendered sequence: maps or photographs, the rig to start from, and the truth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,9 @@ from ..folder_mark import Kind
 from ..png import write_png
 from ..records.calibration import SurfaceEstimate
 from ..records.correspondence import save_map
+from ..records.ground_truth import save_truth
 from ..records.known_input import known_rig, save_rig
 from ..records.rig import Drift, Rig
-from ..records.solution import save_solution
 from ..records.surface import save_surface
 from ..records.trajectory import FrameRow
 from ..rendering.moving_capture import MovingCapture
@@ -54,8 +55,8 @@ def write_recording_folder(
         for k in range(len(capture)):
             advance(k / len(capture), f"Frame {k + 1} of {len(capture)}")
             write(folder, k)
-        truth = capture.truth().model_copy(update={"surface": SURFACE})
-        save_solution(folder / TRUTH, truth)
+        truth = replace(capture.truth(), surface=SURFACE)
+        save_truth(folder / TRUTH, truth)
         save_surface(folder / SURFACE, SurfaceEstimate(*capture.surface()))
         save_trajectories(folder, _rows(capture))
         save_rig(folder / RIG, with_drift(known_rig(truth)))
