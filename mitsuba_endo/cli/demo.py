@@ -11,7 +11,6 @@ import typer
 from .calibrate import exit_code, load_input, solve_and_write
 from .console import Debug, Json, Quiet, Session, session
 from .decode import decode_images
-from .evaluate import evaluate_folders
 from .render import capture_scene
 from .report import write_report
 
@@ -41,6 +40,7 @@ def demo(
 ) -> None:
     """Render an endoscope in a stomach, calibrate it from its image, compare with the truth."""
     with session(quiet, as_json, debug) as output:
+        from ..evaluate.kinds.calibration import evaluate_calibration
         from ..files import atomic_folder
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
@@ -58,7 +58,7 @@ def demo(
             solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
             # Only now, after the solve, is the truth looked at.
             true = folder / "capture" / "truth.json"
-            metrics = evaluate_folders(folder / "solution", true)
+            metrics = evaluate_calibration(folder / "solution", [true])
             metrics.save(folder / "metrics.json")
             write_report([folder / "solution"], folder / "solution" / "report.html", true)
             truth = load_solution(true)
@@ -85,7 +85,7 @@ def _report(
     seconds: float,
     output: Session,
 ) -> None:
-    from .summary import comparison_table, metrics_table
+    from .summary import comparison_table, error_table
 
     program = "mitsuba-endo" if shutil.which("mitsuba-endo") else sys.argv[0]
     output.print(
@@ -93,7 +93,7 @@ def _report(
         "One image of the coded grid; focal length, pose and surface unknown, the length of the "
         "baseline given.",
         comparison_table(solution, truth),
-        metrics_table(metrics),
+        error_table(metrics.tables()[0]),
         *solution.verdict,
         f"Outcome: {solution.outcome}, {seconds:.1f} s in all. Look at:",
         f"  {out}/capture/image.png        what the endoscope sees",

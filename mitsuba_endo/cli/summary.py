@@ -9,22 +9,9 @@ from ..records.solution import INTERVAL
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ..evaluate.metrics_file import Metrics
     from ..evaluate.sequence_metrics import SequenceMetrics
+    from ..evaluate.table import ErrorTable
     from ..records.solution import Estimate, PoseEstimate, Solution
-
-
-METRICS = {
-    "focal_error_percent": ("focal length", "%"),
-    "rotation_error_deg": ("projector rotation", "deg"),
-    "translation_direction_error_deg": ("projector translation direction", "deg"),
-    "baseline_error_percent": ("baseline", "%"),
-    "shape_rmse_mm": ("surface distance, RMS", "mm"),
-    "shape_median_mm": ("surface distance, median", "mm"),
-    "shape_ray_rmse_mm": ("range along camera rays, RMS", "mm"),
-    "coverage": ("true surface covered", "of 1"),
-}
-"""What of :class:`Metrics` is shown, with the unit."""
 
 
 SEQUENCE_METRICS = {
@@ -174,10 +161,12 @@ def sequence_table(metrics: "SequenceMetrics") -> "Table":
     return table
 
 
-def metrics_table(metrics: "Metrics") -> "Table":
-    """List the errors against the truth, or why there is none."""
-    table = _table("Errors against the truth", "Quantity", "Error", "Unit", "Note")
-    for key, (name, unit) in METRICS.items():
-        value: float | None = getattr(metrics, key)
-        table.add_row(name, numbers(value, 4), unit, metrics.reasons.get(key, ""))
+def error_table(found: "ErrorTable") -> "Table":
+    """Return a table of an evaluation, its note below it."""
+    table = _table(found.title, *found.columns)
+    table.caption, table.caption_justify = found.note or None, "left"
+    for row in found.rows:
+        if row[0] and found.columns[0] == "" and table.row_count:
+            table.add_section()
+        table.add_row(*row)
     return table

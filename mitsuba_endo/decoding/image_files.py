@@ -103,7 +103,7 @@ def images_of(folder: Path, suffixes: Sequence[str] = SUFFIXES) -> list[Path]:
     inside = [p for p in visible(folder) if p.suffix.lower() in suffixes]
     if not inside:
         raise InputError("holds no image", str(folder), f"put {', '.join(suffixes)} there")
-    return sorted(inside, key=_natural)
+    return sorted(inside, key=natural_order)
 
 
 def visible(folder: Path) -> list[Path]:
@@ -119,7 +119,8 @@ def visible(folder: Path) -> list[Path]:
         raise InputError(f"cannot be read ({reason})", str(folder), "check the folder") from None
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def natural_order(path: Path) -> list[tuple[int, str]]:
+    """Return a key that sorts names by the numbers in them."""
     parts = re.split(r"(\d+)", path.name.lower())
     return [(int(p), "") if p.isdigit() else (-1, p) for p in parts if p]
 

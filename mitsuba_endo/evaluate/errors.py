@@ -1,13 +1,10 @@
 """A solution against the truth, from records and folders to one record of metrics."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from ..errors import InputError
-from ..geometry.transforms import RigidTransform
-from ..records.calibration import SurfaceEstimate
-from ..records.solution import Frame, Solution
-from ..records.surface import load_surface
+from ..records.solution import Outcome, Solution
+from .matching import MatchBy
 from .metric_value import Metric, rms
 from .metrics_file import FrameMetrics, Metrics
 from .poses import (
@@ -17,10 +14,10 @@ from .poses import (
     rotation_error,
     translation_direction_error,
 )
-from .shape import Alignment, Lighting, ShapeErrors, compare_shape
-
-Pair = tuple[Frame, Frame]
-"""A frame of the solution and that of the truth."""
+from .shape import Alignment, ShapeErrors
+from .surfaces import surface_errors
+from .truths import Pair, Truths, truths_of
+from .values import compare_values
 
 POSE_KEYS = (
     "focal_error_percent", "rotation_error_deg", "translation_direction_error_deg",
@@ -30,71 +27,47 @@ POSE_KEYS = (
 
 def evaluate(
     solution: Solution,
-    truth: Solution,
+    truth: Solution | Truths,
     solution_dir: str | Path | None = None,
     truth_dir: str | Path | None = None,
     alignment: Alignment | None = None,
+    match: MatchBy = "name",
 ) -> Metrics:
     """Compare a solution with the truth.
 
     Args:
         solution: what was found.
-        truth: the exact values, same structure.
-        solution_dir: folder of the solution's surface file; None leaves the shape out.
-        truth_dir: folder of the true surface file; None leaves the shape out.
+        truth: the exact values, same structure; or of several captures, with their surfaces.
+        solution_dir: folder of the solution's surface files; None leaves the shape out.
+        truth_dir: folder of the true surface file of a ``Solution``; None leaves the shape out.
         alignment: what to take out before comparing surfaces; default ``none`` if both are in mm,
             ``scale`` (about the first camera's centre) if the solution is up to scale.
+        match: how frames are paired.
 
     Raises:
         InputError: frames that cannot be paired, images of different sizes, or a named surface file
             that cannot be read.
     """
-    pairs, matched_by = match_frames(solution, truth)
-    no_unit = _without_unit(solution, truth)
-    metrics = [_metrics_of(pairs[0], pair, solution, truth, no_unit) for pair in pairs]
+    truths = truth if isinstance(truth, Truths) else truths_of(truth, truth_dir)
+    chosen, matched_by = truths.match(solution, match)
+    exact = truths.record
+    pairs = [(f, exact.frames[j]) for f, j in zip(solution.frames, chosen, strict=True)]
+    no_unit = _without_unit(solution, exact)
+    metrics = [_metrics_of(pairs[0], pair, solution, exact, no_unit) for pair in pairs]
     names = [frame.name for frame, _ in pairs]
     summary = {key: rms([f[key] for f in metrics], names) for key in POSE_KEYS}
     alignment = alignment or ("none" if solution.units == "mm" else "scale")
-    shape = _shape(solution, truth, solution_dir, truth_dir, pairs[0], alignment)
+    shapes = surface_errors(solution, truths, chosen, solution_dir, alignment)
     reasons = {key: metric.reason for key, metric in summary.items() if metric.reason}
     values: dict[str, Any] = {key: metric.value for key, metric in summary.items()}
     return Metrics(
-        **values, **_shape_values(shape, alignment, reasons), matched_by=matched_by,
-        frames=[_frame_metrics(pair, f) for pair, f in zip(pairs, metrics, strict=True)],
-        reasons=reasons,
+        **values, **_shape_values(shapes[0], alignment, reasons), matched_by=matched_by,
+        frames=[
+            _frame_metrics(pair, f, shape)
+            for pair, f, shape in zip(pairs, metrics, shapes, strict=True)
+        ],
+        values=compare_values(solution, exact, pairs), reasons=reasons,
     )  # fmt: skip
-
-
-def match_frames(
-    solution: Solution, truth: Solution
-) -> tuple[list[Pair], Literal["name", "order"]]:
-    """Pair every frame of the solution with one of the truth.
-
-    By name, else by name without suffix, else by order where there are equally many.
-
-    Raises:
-        InputError: neither way is possible, or the images are of different sizes.
-    """
-    sizes = [(c.width, c.height) for c in (solution.camera, truth.camera) if c is not None]
-    if len(set(sizes)) > 1:
-        here, there = ("{} x {}".format(*size) for size in sizes)
-        raise InputError(
-            f"images of {there} pixels, but the solution's are {here}", "truth: camera",
-            "give the truth of the same capture",
-        )  # fmt: skip
-    for name in (lambda f: f.name, lambda f: Path(f.name).stem):
-        there = {name(f): f for f in truth.frames}
-        unique = len(there) == len(truth.frames)
-        if unique and all(name(f) in there for f in solution.frames):
-            return [(f, there[name(f)]) for f in solution.frames], "name"
-    if len(solution.frames) != len(truth.frames):
-        lost = next(f.name for f in solution.frames if f.name not in {t.name for t in truth.frames})
-        raise InputError(
-            f"no frame of this name in the truth, which has {len(truth.frames)} frames",
-            f"solution: frame {lost}",
-            "name the truth's frames as the maps",
-        )
-    return list(zip(solution.frames, truth.frames, strict=True)), "order"
 
 
 def _without_unit(solution: Solution, truth: Solution) -> Metric | None:
@@ -103,6 +76,11 @@ def _without_unit(solution: Solution, truth: Solution) -> Metric | None:
         if record.units != "mm":
             return Metric.unknown(f"the {side} is up to scale")
     return None
+
+
+def is_truth(solution: Solution) -> bool:
+    """Tell exact values, and those of files without deviations, from a calibration's."""
+    return solution.outcome is Outcome.TRUTH
 
 
 def _metrics_of(
@@ -114,6 +92,8 @@ def _metrics_of(
         (first[0].world_from_camera, found.world_from_camera),
         (first[1].world_from_camera, true.world_from_camera),
     )
+    if pair is not first and found.world_from_camera.status == "fixed" and not is_truth(solution):
+        turned = moved = Metric.unknown("the camera's pose is no unknown")
     return {
         "focal_error_percent": focal_error(
             found.focal or solution.projector.focal, true.focal or truth.projector.focal
@@ -126,63 +106,13 @@ def _metrics_of(
     }
 
 
-def _frame_metrics(pair: Pair, metrics: dict[str, Metric]) -> FrameMetrics:
+def _frame_metrics(
+    pair: Pair, metrics: dict[str, Metric], shape: ShapeErrors | str
+) -> FrameMetrics:
     values: dict[str, Any] = {key: metric.value for key, metric in metrics.items()}
+    if not isinstance(shape, str):
+        values |= {"shape_rmse_mm": shape.rmse, "shape_median_mm": shape.median}
     return FrameMetrics(name=pair[0].name, truth=pair[1].name, **values)
-
-
-def _shape(
-    solution: Solution,
-    truth: Solution,
-    solution_dir: str | Path | None,
-    truth_dir: str | Path | None,
-    first: Pair,
-    alignment: Alignment,
-) -> ShapeErrors | str:
-    """Return the shape errors or why there are none."""
-    sides = (("solution", solution, solution_dir), ("truth", truth, truth_dir))
-    surfaces = []
-    for side, record, folder in sides:
-        if record.surface is None:
-            return f"the {side} has no surface"
-        if folder is None:
-            return f"the folder of the {side}'s surface is not given"
-        surfaces.append(Path(folder) / record.surface)
-    camera = truth.camera or solution.camera
-    if camera is None:
-        return "neither side has camera intrinsics"
-    if truth.units != "mm":
-        return "the truth is up to scale"
-    if solution.units != "mm" and alignment in ("none", "rigid"):
-        return f"the solution is up to scale, which alignment '{alignment}' leaves as it is"
-    frame_from_truth = first_from_truth(truth, first[1])
-    if frame_from_truth is None:
-        return "the true camera pose of the solution's first frame is null"
-    found, true = (load_surface(path) for path in surfaces)
-    true = SurfaceEstimate(frame_from_truth.apply(true.vertices), true.faces)
-    return compare_shape(found, true, camera.to_model(), _lighting(truth, first[1]), alignment)
-
-
-def first_from_truth(truth: Solution, frame: Frame) -> RigidTransform | None:
-    """Return the motion from the truth's first camera to that of ``frame``.
-
-    The true surface is given in the truth's first camera, which the solution may have left out.
-    """
-    if frame is truth.frames[0]:
-        return RigidTransform.identity()
-    first = truth.frames[0].world_from_camera.to_transform()
-    other = frame.world_from_camera.to_transform()
-    return None if first is None or other is None else other.inverse() @ first
-
-
-def _lighting(truth: Solution, frame: Frame) -> Lighting | None:
-    projector = truth.projector
-    if frame.focal is not None:
-        projector = projector.model_copy(update={"focal": frame.focal})
-    model, pose = projector.to_model(), frame.projector_from_camera.to_transform()
-    if model is None or pose is None or not (projector.width and projector.height):
-        return None
-    return Lighting(model, (projector.width, projector.height), pose)
 
 
 def _shape_values(

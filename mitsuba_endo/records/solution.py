@@ -83,6 +83,19 @@ class PoseEstimate(Record):
         """Return the transform, or None where it could not be determined."""
         return None if self.R is None or self.t is None else RigidTransform.of(self.R, self.t)
 
+    def length_std(self) -> float | None:
+        """Return the standard deviation of the translation's length, None where it is unknown.
+
+        With u = t / |t| it is sqrt(u' C u), C being the translation's covariance; of files without
+        covariances the most that their deviations allow, sum |u_i| s_i.
+        """
+        if self.t is None or self.std is None or not any(self.t):
+            return None
+        u = np.array(self.t) / np.linalg.norm(self.t)
+        if self.covariance is None:
+            return float(np.abs(u) @ np.array(self.std[3:]))
+        return float(np.sqrt(max(u @ np.array(self.covariance)[3:, 3:] @ u, 0.0)))
+
 
 class ProjectorEstimate(Record):
     """Projector intrinsics."""

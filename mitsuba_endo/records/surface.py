@@ -19,6 +19,12 @@ from .calibration import SurfaceEstimate
 STD_PROPERTY = "std_0"
 MODES = "surface_modes.npz"
 """The surfaces' modes, by the names of the surfaces' files; beside them."""
+SURFACE = "surface.ply"
+
+
+def own_surface_name(frame: int) -> str:
+    """Return the file name of the surface of one frame, where frames do not share one."""
+    return f"surface_{frame:02d}.ply" if frame else SURFACE
 
 
 def save_surface(

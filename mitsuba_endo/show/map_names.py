@@ -4,8 +4,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-SURFACE = "surface.ply"
-
 
 def map_names(frames: Sequence[str]) -> list[str]:
     """Return the file names of the rendered maps: ``rendered.exr``, or one a frame."""
@@ -15,11 +13,6 @@ def map_names(frames: Sequence[str]) -> list[str]:
 def observed_names(frames: Sequence[str]) -> list[str]:
     """Return the file names of the observed maps: ``observed.exr``, or one a frame."""
     return file_names("observed", frames)
-
-
-def own_surface_name(frame: int) -> str:
-    """Return the file name of the surface of one frame, where frames do not share one."""
-    return f"surface_{frame:02d}.ply" if frame else SURFACE
 
 
 def file_names(kind: str, frames: Sequence[str], suffix: str = ".exr") -> list[str]:

@@ -15,8 +15,8 @@ from ..records.exr_files import read_exr, write_exr
 from ..records.history import load_history
 from ..records.map_arrays import CHANNELS
 from ..records.solution import load_solution
-from ..records.surface import load_with_modes
-from .map_names import map_names, observed_names, own_surface_name
+from ..records.surface import load_with_modes, own_surface_name
+from .map_names import map_names, observed_names
 
 USED = "used"
 """Channel of the observed maps: 1 where the solver used the correspondence."""

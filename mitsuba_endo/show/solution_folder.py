@@ -19,11 +19,11 @@ from ..records.history import FILE as HISTORY
 from ..records.history import save_history, thinned
 from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
-from ..records.surface import MODES, save_modes, save_surface
+from ..records.surface import MODES, SURFACE, own_surface_name, save_modes, save_surface
 from ..records.trajectory import save_frames
 from . import figures
 from .extras import EXTRAS, check_extras
-from .map_names import SURFACE, map_names, observed_names, own_surface_name
+from .map_names import map_names, observed_names
 from .read_folder import save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene

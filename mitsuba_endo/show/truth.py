@@ -7,12 +7,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..evaluate.depth import RayCaster
-from ..evaluate.errors import Pair, first_from_truth, match_frames
 from ..evaluate.shape import Alignment, alignment_of
+from ..evaluate.surfaces import camera_from_surface
+from ..evaluate.truths import Truths, load_truths
 from ..geometry.transforms import RigidTransform
 from ..reading.regular import is_file
 from ..records.calibration import Calibration, SurfaceEstimate
-from ..records.solution import Solution, load_solution
+from ..records.solution import Solution
 from ..records.surface import load_surface
 from .frame_poses import Floats, FramePoses, frame_poses
 
@@ -41,54 +42,55 @@ def find_truth(result: str | Path, solution: Solution) -> Path | None:
         path = folder / name
         if is_file(path):
             try:
-                truth = load_solution(path)
-                _, matched_by = match_frames(solution, truth)
+                truths = load_truths([path])
+                _, matched = truths.match(solution)
             except InputError:
                 continue  # another result's, or no truth at all
-            named = matched_by == "name" or _is_decoded(solution, truth, path.parent)
-            if named and truth.camera == solution.camera:
+            if matched == "name" and truths.record.camera == solution.camera:
                 return path.resolve()
     return None
 
 
-def _is_decoded(solution: Solution, truth: Solution, folder: Path) -> bool:
-    """Tell whether the one frame is called as the capture's image, from which it was decoded."""
-    image = folder / Path(solution.frames[0].name).with_suffix(".png").name
-    return len(truth.frames) == 1 and is_file(image)
-
-
-def read_truth(path: str | Path, solution: Solution) -> tuple[Solution, list[Pair]]:
-    """Read a truth's numbers; return them, and each frame of the solution with the true one.
+def read_truth(path: str | Path, solution: Solution) -> tuple[Truths, list[int]]:
+    """Read a truth's numbers; return them, and the index of each frame's true one.
 
     Raises:
         InputError: it cannot be read, or its frames or their size are not those of the solution.
     """
-    truth = load_solution(path)
-    pairs, _ = match_frames(solution, truth)
-    return truth, pairs
+    truths = load_truths([path])
+    return truths, truths.match(solution)[0]
 
 
 def load_truth(path: str | Path, calibration: Calibration) -> Truth:
     """Read a truth and bring it into the solution's unit.
 
+    Args:
+        path: a truth, or a folder of captures, as ``evaluate`` takes them.
+        calibration: what was found.
+
     Raises:
-        InputError: as :func:`read_truth`; its surface cannot be read; or the solution is up to
-            scale and nothing tells the scale.
+        InputError: it cannot be read, its frames or their size are not those of the solution, its
+            surface cannot be read, or the solution is up to scale and nothing tells the scale.
     """
     path, solution = Path(path), calibration.solution
-    truth, pairs = read_truth(path, solution)
-    same = truth.model_copy(update={"frames": [true for _, true in pairs]})
-    moved = first_from_truth(truth, pairs[0][1])
-    surface = None
-    if truth.surface is not None and moved is not None:
-        folder = path if path.is_dir() else path.parent
-        loaded = load_surface(folder / truth.surface)
-        surface = SurfaceEstimate(moved.apply(loaded.vertices), loaded.faces)
+    truths, chosen = read_truth(path, solution)
+    truth = truths.record
+    same = truth.model_copy(update={"frames": [truth.frames[j] for j in chosen]})
+    surface = _surface(truths, chosen[0])
     alignment: Alignment = "none" if solution.units == truth.units else "scale"
     factor = _factor(calibration, surface, alignment)
     if surface is not None:
         surface = SurfaceEstimate(factor * surface.vertices, surface.faces)
     return Truth(path, [_scaled(p, factor) for p in frame_poses(same)], surface, alignment)
+
+
+def _surface(truths: Truths, index: int) -> SurfaceEstimate | None:
+    """Return the true surface in a frame's camera, None where either is not known."""
+    moved, path = camera_from_surface(truths, index), truths.surfaces[index]
+    if path is None or moved is None:
+        return None
+    loaded = load_surface(path)
+    return SurfaceEstimate(moved.apply(loaded.vertices), loaded.faces)
 
 
 def _factor(

@@ -245,7 +245,7 @@ def test_nothing_of_the_cache_is_left(whole):
 def test_a_samples_folder_is_a_capture_that_can_be_calibrated_and_judged(tmp_path: Path):
     """Oracle: the commands' own checks of their input; the truth compared with itself."""
     from mitsuba_endo.cli.calibrate import load_input
-    from mitsuba_endo.cli.evaluate import evaluate_folders
+    from mitsuba_endo.evaluate.kinds.calibration import evaluate_calibration
 
     make_here(small_config(), tmp_path / "out", 1)
     folder = tmp_path / "out" / "samples" / "000000"
@@ -253,7 +253,7 @@ def test_a_samples_folder_is_a_capture_that_can_be_calibrated_and_judged(tmp_pat
     stored = Dataset(tmp_path / "out")[0].arrays
     np.testing.assert_array_equal(map_.valid, stored["visible"])
     assert rig.projector.focal.value is None
-    metrics = evaluate_folders(folder, folder / "truth.json")
+    metrics = evaluate_calibration(folder, [folder / "truth.json"])
     assert metrics.focal_error_percent == 0
     assert metrics.rotation_error_deg == pytest.approx(0, abs=1e-6)
     assert metrics.shape_rmse_mm == pytest.approx(0, abs=1e-4)

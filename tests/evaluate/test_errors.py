@@ -3,70 +3,23 @@
 import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.evaluate.errors import evaluate, match_frames
+from mitsuba_endo.evaluate.errors import evaluate
 from mitsuba_endo.evaluate.metrics_file import Metrics
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
-from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.solution import (
     Estimate,
-    Frame,
-    Outcome,
     PoseEstimate,
-    ProjectorEstimate,
-    Solution,
 )
 from mitsuba_endo.records.surface import save_surface
+from tests.evaluate.records import CAMERA_POSES, record_of, with_focal, with_frame
 
 pytestmark = pytest.mark.usefixtures("llvm")
-
-NAMES = ["a.exr", "b.exr", "c.exr"]
-CAMERA_POSES = [
-    RigidTransform.identity(),
-    RigidTransform.of([0.02, 0.05, 0.1], [3.0, -2, 4]),
-    RigidTransform.of([-0.03, 0.02, 0.2], [-4.0, 1, 6]),
-]
-
-
-def _record(world: SimpleNamespace, names: list[str] = NAMES, **changes: Any) -> Solution:
-    """The exact solution of the world's rig, one frame for each name."""
-    camera = world.camera
-    fields: dict[str, Any] = {
-        "outcome": Outcome.TRUTH, "units": "mm", "scale": "truth", "surface": "surface.ply",
-        "camera": Camera.from_model(camera),
-        "projector": ProjectorEstimate(
-            law=world.projector.law, width=world.size[0], height=world.size[1],
-            focal=Estimate(value=world.projector.focal, status="fixed"),
-            centre=Estimate(value=list(world.projector.centre), status="fixed"),
-            aspect=Estimate(value=world.projector.aspect, status="fixed"),
-            distortion=Estimate(value=[0.03], status="fixed"),
-        ),
-        "frames": [
-            Frame(
-                name=name, projector_from_camera=PoseEstimate.of(world.pose),
-                world_from_camera=PoseEstimate.of(pose),
-            )
-            for name, pose in zip(names, CAMERA_POSES, strict=False)
-        ],
-    }  # fmt: skip
-    return Solution(**(fields | changes))
-
-
-def _with_frame(record: Solution, index: int, **changes: Any) -> Solution:
-    frames = list(record.frames)
-    frames[index] = frames[index].model_copy(update=changes)
-    return record.model_copy(update={"frames": frames})
-
-
-def _with_focal(record: Solution, **fields: Any) -> Solution:
-    projector = record.projector.model_copy(update={"focal": Estimate(**fields)})
-    return record.model_copy(update={"projector": projector})
 
 
 @pytest.fixture
@@ -80,7 +33,7 @@ def folders(tmp_path: Path, world: SimpleNamespace) -> tuple[Path, Path]:
 
 def test_truth_against_itself_is_perfect(world: SimpleNamespace, folders: tuple[Path, Path]):
     """Oracle: zero errors, full coverage, no reasons."""
-    truth = _record(world)
+    truth = record_of(world)
     found = evaluate(truth, truth, folders[1], folders[1])
     assert found.focal_error_percent == 0
     assert found.rotation_error_deg == pytest.approx(0, abs=1e-12)
@@ -96,12 +49,12 @@ def test_truth_against_itself_is_perfect(world: SimpleNamespace, folders: tuple[
 
 def test_known_errors_come_out(world: SimpleNamespace, folders: tuple[Path, Path]):
     """Oracle: the errors put in: f + 1 %, 0.3 degrees and + 2 % of baseline in frame b of three."""
-    solution = _with_focal(_record(world), value=121.2, status="measured")
+    solution = with_focal(record_of(world), value=121.2, status="measured")
     pose = world.pose
     turned = RigidTransform.of([np.radians(0.3), 0, 0], [0, 0, 0]).R @ pose.R
     wrong = PoseEstimate.of(RigidTransform(turned, 1.02 * pose.t))
     found = evaluate(
-        _with_frame(solution, 1, projector_from_camera=wrong), _record(world), *folders
+        with_frame(solution, 1, projector_from_camera=wrong), record_of(world), *folders
     )
     assert found.focal_error_percent == pytest.approx(1.0)
     assert found.rotation_error_deg == pytest.approx(0.3 / np.sqrt(3), rel=1e-6)
@@ -117,7 +70,7 @@ def test_file_has_the_documented_keys(
     world: SimpleNamespace, folders: tuple[Path, Path], tmp_path: Path
 ):
     """Oracle: the list of keys in the documentation of `evaluate`, read by plain json."""
-    found = evaluate(_record(world), _record(world), *folders)
+    found = evaluate(record_of(world), record_of(world), *folders)
     found.save(tmp_path / "metrics.json")
     data = json.loads((tmp_path / "metrics.json").read_text())
     assert data.keys() >= {
@@ -129,8 +82,8 @@ def test_file_has_the_documented_keys(
 
 def test_unobservable_focal_is_null_with_reason(world: SimpleNamespace, folders: tuple[Path, Path]):
     """Oracle: null, the reason carried over, and the other figures still there."""
-    solution = _with_focal(_record(world), value=None, status="unobservable", reason="a plane")
-    found = evaluate(solution, _record(world), *folders)
+    solution = with_focal(record_of(world), value=None, status="unobservable", reason="a plane")
+    found = evaluate(solution, record_of(world), *folders)
     assert found.focal_error_percent is None
     assert "a plane" in found.reasons["focal_error_percent"]
     assert found.rotation_error_deg is not None
@@ -140,8 +93,8 @@ def test_unobservable_focal_is_null_with_reason(world: SimpleNamespace, folders:
 def test_focal_per_frame(world: SimpleNamespace, folders: tuple[Path, Path]):
     """Oracle: signed per frame, root mean square over frames: +3 %, 0, 0 gives sqrt(3) %."""
     focal = Estimate(value=1.03 * 120, status="measured")
-    solution = _with_frame(_record(world), 0, focal=focal)
-    found = evaluate(solution, _record(world), *folders)
+    solution = with_frame(record_of(world), 0, focal=focal)
+    found = evaluate(solution, record_of(world), *folders)
     assert [f.focal_error_percent for f in found.frames] == pytest.approx([3, 0, 0])
     assert found.focal_error_percent == pytest.approx(np.sqrt(3))
 
@@ -150,19 +103,19 @@ def test_up_to_scale(world: SimpleNamespace, tmp_path: Path, folders: tuple[Path
     """Oracle: lengths divided by the baseline: no baseline error, shape compared after scaling."""
     baseline = float(np.linalg.norm(world.pose.t))
     unit = PoseEstimate.of(RigidTransform(world.pose.R, world.pose.t / baseline))
-    solution = _record(world, ["a.exr"], units="baseline", scale="up_to_scale")
-    solution = _with_frame(solution, 0, projector_from_camera=unit)
+    solution = record_of(world, ["a.exr"], units="baseline", scale="up_to_scale")
+    solution = with_frame(solution, 0, projector_from_camera=unit)
     true = world.sheet()
     small = SurfaceEstimate(true.vertices / baseline, true.faces)
     save_surface(tmp_path / "surface.ply", small)
-    found = evaluate(solution, _record(world, ["a.exr"]), tmp_path, folders[1])
+    found = evaluate(solution, record_of(world, ["a.exr"]), tmp_path, folders[1])
     assert found.baseline_error_percent is None
     assert "up to scale" in found.reasons["baseline_error_percent"]
     assert found.translation_direction_error_deg == pytest.approx(0, abs=1e-9)
     assert found.alignment == "scale"
     assert found.alignment_scale == pytest.approx(baseline, rel=1e-6)
     assert found.shape_rmse_mm == pytest.approx(0, abs=1e-4)
-    refused = evaluate(solution, _record(world, ["a.exr"]), tmp_path, folders[1], "none")
+    refused = evaluate(solution, record_of(world, ["a.exr"]), tmp_path, folders[1], "none")
     assert refused.shape_rmse_mm is None
     assert "up to scale" in refused.reasons["shape_rmse_mm"]
 
@@ -174,7 +127,7 @@ def test_first_frame_left_out(world: SimpleNamespace, tmp_path: Path):
     save_surface(tmp_path / "truth" / "surface.ply", true)
     moved = SurfaceEstimate(CAMERA_POSES[1].inverse().apply(true.vertices), true.faces)
     save_surface(tmp_path / "surface.ply", moved)
-    truth = _record(world)
+    truth = record_of(world)
     solution = truth.model_copy(update={"frames": truth.frames[1:]})
     found = evaluate(solution, truth, tmp_path, tmp_path / "truth")
     assert [(f.name, f.truth) for f in found.frames] == [("b.exr", "b.exr"), ("c.exr", "c.exr")]
@@ -193,7 +146,7 @@ def test_shape_that_cannot_be_compared(
     world: SimpleNamespace, folders: tuple[Path, Path], change: dict, reason: str
 ):
     """Oracle: null with the reason; poses are compared all the same."""
-    found = evaluate(_record(world), _record(world, **change), *folders)
+    found = evaluate(record_of(world), record_of(world, **change), *folders)
     assert found.shape_rmse_mm is None
     assert found.coverage is None
     assert found.alignment is None
@@ -203,35 +156,19 @@ def test_shape_that_cannot_be_compared(
 
 def test_folder_not_given(world: SimpleNamespace):
     """Oracle: null with the reason."""
-    found = evaluate(_record(world), _record(world))
+    found = evaluate(record_of(world), record_of(world))
     assert found.reasons["coverage"] == "the folder of the solution's surface is not given"
 
 
 def test_missing_surface_file(world: SimpleNamespace, tmp_path: Path):
     """Oracle: a file that is named must be there."""
     with pytest.raises(InputError, match=r"surface.ply: no such file"):
-        evaluate(_record(world), _record(world), tmp_path, tmp_path)
-
-
-def _names(world: SimpleNamespace, found: list[str], true: list[str]) -> tuple[list, str]:
-    pairs, how = match_frames(_record(world, found), _record(world, true))
-    return [(f.name, t.name) for f, t in pairs], how
-
-
-def test_matching(world: SimpleNamespace):
-    """Oracle: by name whatever the order, by stem, else by order."""
-    assert _names(world, ["b.exr", "a.exr"], NAMES) == (
-        [("b.exr", "b.exr"), ("a.exr", "a.exr")], "name",
-    )  # fmt: skip
-    assert _names(world, ["b.exr"], ["a.npz", "b.npz"]) == ([("b.exr", "b.npz")], "name")
-    assert _names(world, ["x", "y"], ["a", "b"]) == ([("x", "a"), ("y", "b")], "order")
-    with pytest.raises(InputError, match="frame x: no frame of this name in the truth"):
-        _names(world, ["x"], ["a", "b"])
+        evaluate(record_of(world), record_of(world), tmp_path, tmp_path)
 
 
 def test_images_of_another_size_are_refused(world: SimpleNamespace):
     """Oracle: the size that the test gave the truth; a side without camera tells nothing."""
-    solution, truth = _record(world), _record(world)
+    solution, truth = record_of(world), record_of(world)
     assert truth.camera is not None
     wider = truth.camera.model_copy(update={"width": 68})
     with pytest.raises(InputError, match=r"camera: images of 68 x 45 .* solution's are 67 x 45; "):

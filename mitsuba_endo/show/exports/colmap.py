@@ -16,8 +16,8 @@ from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...reading.regular import is_file
 from ...records.solution import Solution
-from ...records.surface import load_surface
-from ..map_names import observed_names, own_surface_name
+from ...records.surface import load_surface, own_surface_name
+from ..map_names import observed_names
 from .registry import register_exporter
 from .required_values import (
     camera_in,
