@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -29,6 +30,8 @@ from mitsuba_endo.show.truth import find_truth
 from mitsuba_endo.show.viewer import address, open_viewer, running_server
 
 WIDTH, HEIGHT = 1240, 930
+IMAGES, SWING = 30, 75
+"""Of the turning surface, and how far the mouse turns it to either side, pixels."""
 SETTLE = 10.0
 """Seconds that software WebGL needs to draw."""
 
@@ -57,8 +60,49 @@ def _result(result: Path, out: Path) -> None:
     if EXECUTABLE is None:
         print("no Chromium: report.png and viewer.png are left as they are")
         return
+    _seen(result, out)
+    _turning(result, out)
     _report(result, out)
     _viewer(result, out)
+
+
+def _seen(result: Path, out: Path) -> None:
+    """Write the photograph from which the result was made."""
+    calibration = read_solution_folder(result)
+    image = calibration.photographs[calibration.frames[0].name]
+    cv2.imwrite(str(out / "seen.png"), np.ascontiguousarray(image[..., ::-1]))
+
+
+def _turning(result: Path, out: Path) -> None:
+    """Write the report's scene, swinging to and fro, as a short GIF."""
+    from PIL import Image
+
+    swing = np.round(SWING * np.sin(2 * np.pi * np.arange(IMAGES + 1) / IMAGES)).astype(int)
+    pictures = []
+    with tempfile.TemporaryDirectory() as folder, browser(760, 900) as page:
+        page.open((result / "report.html").absolute().as_uri())
+        time.sleep(1)
+        page.evaluate("document.querySelector('.space [name=axes]').click()")
+        left, top, right, bottom = page.evaluate(
+            "(() => { const r = document.querySelector('canvas.scene').getBoundingClientRect();"
+            "return [r.left, r.top, r.right, r.bottom]; })()"
+        )
+        page.send("Input.dispatchMouseEvent", type="mouseWheel", x=left + 50, y=top + 50,
+                  deltaX=0, deltaY=160)  # fmt: skip
+        x, y = (left + right) / 2, (top + bottom) / 2
+        mouse = partial(page.send, "Input.dispatchMouseEvent", y=y, button="left")
+        mouse(type="mousePressed", x=x, clickCount=1)
+        for shift in swing[:-1]:
+            mouse(type="mouseMoved", x=x + float(shift), buttons=1)
+            time.sleep(0.15)
+            page.screenshot(Path(folder) / "part.png", (top, bottom))
+            with Image.open(Path(folder) / "part.png") as picture:
+                inside = picture.crop((int(left) + 1, 1, int(right) - 1, int(bottom - top) - 1))
+                small = inside.convert("RGB").resize((inside.width // 2, inside.height // 2))
+                pictures.append(small.quantize(64))
+    pictures[0].save(
+        out / "turning.gif", save_all=True, append_images=pictures[1:], duration=90, loop=0
+    )
 
 
 def _report(result: Path, out: Path) -> None:

@@ -8,6 +8,7 @@ import contextlib
 import json
 import os
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -24,6 +25,11 @@ EXIT_FAULT = 1
 """Done, but with a result to be wary of: not converged, or doctor found a fault."""
 EXIT_INTERNAL = 70
 """An unexpected exception (EX_SOFTWARE of sysexits.h)."""
+
+EVERY = 10.0
+"""Seconds between lines of one step outside a terminal."""
+SHORT = 2.0
+"""Seconds of work that need no word."""
 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the summary as JSON on stdout.")]
@@ -51,19 +57,42 @@ class Session:
 
     @contextlib.contextmanager
     def progress(self, text: str) -> Iterator[Advance]:
-        """Show a progress bar on stderr and yield the function that moves it."""
+        """Show what is being done on stderr and yield the function that tells it.
+
+        In a terminal as a bar; elsewhere, in a file or another program's log, as a line for each
+        step and frame, and of a long step one in :data:`EVERY` seconds; none of short work.
+        """
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
         console = _console(stderr=True)
-        disable = self.quiet or not console.is_terminal
-        with Progress(*columns, console=console, transient=True, disable=disable) as bar:
+        if not self.quiet and not console.is_terminal:
+            yield _Lines(text).advance
+            return
+        with Progress(*columns, console=console, transient=True, disable=self.quiet) as bar:
             task = bar.add_task(text, total=None)
 
             def advance(share: float, what: str) -> None:
                 bar.update(task, completed=share, total=1.0, description=what)
 
             yield advance
+
+
+class _Lines:
+    """Progress as lines of a log."""
+
+    def __init__(self, text: str) -> None:
+        self._began = self._told = time.monotonic()
+        self._said = ""
+        self.advance(0.0, text)
+
+    def advance(self, _share: float, what: str) -> None:
+        """Print a step or frame when it begins, and then now and then; nothing of short work."""
+        now, step = time.monotonic(), what.partition(" (")[0]
+        if now - self._began < SHORT or (step == self._said and now - self._told < EVERY):
+            return
+        self._said, self._told = step, now
+        print(f"[{now - self._began:6.1f} s] {what}", file=sys.stderr, flush=True)
 
 
 @contextlib.contextmanager

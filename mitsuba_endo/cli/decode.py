@@ -133,8 +133,9 @@ def decode_into(
     masks = Masks.at(mask) if mask else None
     found, notes = [], set()
     with output.progress("Decoding") as advance:
-        for frame in read_frames(images):
-            advance(0.0, f"Decoding {frame.name}")
+        for k, frame in enumerate(read_frames(images), 1):
+            of = f"frame {k}" if len(images) == 1 else f"frame {k} of {max(k, len(images))}"
+            advance(0.0, f"Decoding {frame.name}, {of}")
             if frame.note and frame.note not in notes:
                 output.print(f"warning: {frame.note}")
             notes.add(frame.note)
@@ -224,11 +225,13 @@ def _write(folder: Path, frame: "ImageFrame", result: "DecodedGrid", map_: "Deco
     from ..png import write_png
     from ..records.correspondence import write_map
     from ..show.grid_picture import grid_picture
+    from ..show.photographs import photograph_path, save_photograph
 
     picture = grid_picture(frame.image, result)
     write_png(folder / f"{frame.name}_graph.png", picture)
     if result.reason:
         return
+    save_photograph(photograph_path(folder, frame.name), frame.image)
     write_map(map_path(folder, frame.name), map_.map, {"confidence": map_.confidence})
 
 

@@ -55,7 +55,9 @@ def demo(
             decoded.mkdir()
             paths = decode_images([folder / "input" / IMAGE], rig_file, None, True, decoded, output)
             maps, rig = load_input(paths, rig_file)
-            solution = solve_and_write(maps, rig, Options(seed=seed), folder / "solution", output)
+            solution = solve_and_write(
+                maps, rig, Options(seed=seed), folder / "solution", output, decoded=decoded
+            )
             # Only now, after the solve, is the truth looked at.
             true = folder / "capture" / "truth.json"
             metrics = evaluate_calibration(folder / "solution", [true])

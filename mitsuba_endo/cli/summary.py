@@ -61,7 +61,8 @@ def solution_table(solution: "Solution") -> "Table":
             given = i == 0 and solution.scale in ("baseline", "up_to_scale")
             status = "fixed" if given else pose.status
             length = f"{np.linalg.norm(transform.t):.5g}"
-            table.add_row("baseline", length, "", solution.units, status)
+            half = "" if given else _half(pose.length_std())
+            table.add_row("baseline", length, half, solution.units, status)
         if frame.rms_px is not None:
             used = "" if frame.used is None else f"{frame.used} pixels"
             table.add_row("residual RMS", f"{frame.rms_px:.3f}", "", "pattern px", used)

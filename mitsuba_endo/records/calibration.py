@@ -1,6 +1,6 @@
 """Everything a calibration hands on: the solution and the arrays that belong to it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,6 +62,11 @@ class TraceRow:
     """Scale of the robust loss, pattern pixels."""
     step: float
     """Largest change of an unknown in this iteration, relative to its own scale."""
+    fixed_cost: float | None = None
+    """As ``cost``, of the correspondences alone, under the loss that ended the optimisation."""
+    lengths: tuple[float, ...] = ()
+    """Quantiles of the whitened residuals' lengths, pattern pixels, missed ones infinite: from them
+    ``fixed_cost`` is made at the end. Not saved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +106,5 @@ class Calibration:
     its camera's frame."""
     history: list[Snapshot] = field(default_factory=list)
     """How the optimisation went, the solution's unit."""
+    photographs: Mapping[str, NDArray[np.uint8]] = field(default_factory=dict)
+    """What the camera saw, (H, W, 3) RGB, by the frames' names, where maps come from images."""

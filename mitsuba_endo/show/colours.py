@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 MISSING = "#e4e4e4"
 UNUSED = "#9c9c9c"
 RESIDUAL = "PuOr_r"
-DEPTH = "cividis"
+DEPTH = "cividis_r"
+"""Near is bright: walls close to the camera shine in a photograph too."""
 CAMERA, PROJECTOR = "#0072b2", "#d55e00"  # of Okabe and Ito's colour-blind safe palette
 
 _STEPS = 1024

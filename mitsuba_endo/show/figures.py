@@ -26,6 +26,10 @@ DPI = 110
 _PANEL_AREA = 13.0  # square inches of image in a panel
 _MAX_COLUMNS = 4
 """Panels beside one another. Chosen for looks."""
+NARROW = 26
+"""Unknowns up to which each has a row; more would be too small to read."""
+_ROW_INCHES = 0.15
+"""Height of a row in which a label can be read."""
 _MAX_NUMBERED = 14
 """Unknowns up to which a correlation matrix has room for its numbers."""
 
@@ -153,12 +157,40 @@ def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:
 
 
 def correlation_figure(unknowns: list[str], matrix: list[list[float | None]]) -> Figure:
-    """Draw the correlation matrix of the unknowns; grey where one has no variance."""
-    figure = Figure(figsize=(7, 5), layout="constrained")
-    axes = figure.subplots()
+    """Draw the correlation matrix of the unknowns; grey where one has no variance.
+
+    Of many unknowns every row is what belongs together, a pose or a focal length, and every cell
+    the strongest correlation between two of them.
+    """
     values = np.array([[np.nan if v is None else v for v in row] for row in matrix])
-    panels.correlation(axes, unknowns, values, numbers=len(unknowns) <= _MAX_NUMBERED)
+    title = "Correlation of the unknowns"
+    if len(unknowns) > NARROW:
+        unknowns, values = strongest(unknowns, values)
+        title = "Strongest correlation between unknowns of each group"
+    side = max(5.0, _ROW_INCHES * len(unknowns))
+    figure = Figure(figsize=(side + 2, side), layout="constrained")
+    numbers = len(unknowns) <= _MAX_NUMBERED
+    panels.correlation(figure.subplots(), unknowns, values, numbers=numbers, title=title)
     return figure
+
+
+def strongest(unknowns: list[str], values: NDArray[Any]) -> tuple[list[str], NDArray[Any]]:
+    """Return groups of unknowns and the largest correlations (G, G) between them, with signs.
+
+    An unknown ``projector pose of a.exr (translation z)`` is of the group before the bracket.
+    """
+    groups = [name.split(" (")[0] for name in unknowns]
+    names = list(dict.fromkeys(groups))
+    members = [np.flatnonzero([group == name for group in groups]) for name in names]
+    out = np.full((len(names), len(names)), np.nan)
+    for i, rows in enumerate(members):
+        for j, columns in enumerate(members):
+            block = values[np.ix_(rows, columns)].copy()
+            if i == j and len(rows) > 1:
+                np.fill_diagonal(block, np.nan)
+            if np.isfinite(block).any():
+                out[i, j] = block.ravel()[np.nanargmax(np.abs(block))]
+    return names, out
 
 
 def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:

@@ -12,6 +12,8 @@ DIMMED = 0.55
 """Brightness of the image under the grid's lines, of full scale. Chosen for looks."""
 COLOURS = ((178, 114, 0), (0, 159, 230), (115, 158, 0), (167, 121, 204))
 """Blue, orange, green, purple (B, G, R) of Okabe and Ito's palette, in turn from line to line."""
+LEGEND = 30
+"""Height of the legend, pixels."""
 REFUSED = (235, 235, 235)
 """Light grey (B, G, R): links and nodes that were not assigned."""
 LABELLED = 8
@@ -48,7 +50,29 @@ def grid_picture(
         _label(canvas, at[k] // FINE, f"{assignment.node[k, 0]},{assignment.node[k, 1]}")
     if decoded.reason:
         _label(canvas, np.array([4, 24]), decoded.reason)
-    return canvas
+    return np.concatenate([canvas, _legend(canvas.shape[1])])
+
+
+def _legend(width: int) -> NDArray[np.uint8]:
+    """Return a strip that says what colours and numbers mean."""
+    strip = np.full((LEGEND, width, 3), 24, np.uint8)
+    x = 12
+    for colour in COLOURS:
+        cv2.line(strip, (x, LEGEND // 2), (x + 26, LEGEND // 2), colour, 3, cv2.LINE_AA)
+        x += 32
+    x = _words(strip, x, "a column or row of the pattern: its colour never changes along it")
+    cv2.line(strip, (x, LEGEND // 2), (x + 26, LEGEND // 2), REFUSED, 1, cv2.LINE_AA)
+    cv2.circle(strip, (x + 40, LEGEND // 2), 4, REFUSED, 1, cv2.LINE_AA)
+    x = _words(strip, x + 52, "found and refused")
+    _words(strip, x, "8,16: column and row of a node")
+    return strip
+
+
+def _words(strip: NDArray[np.uint8], x: int, text: str) -> int:
+    """Write into the legend and return where the next entry begins."""
+    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.45
+    cv2.putText(strip, text, (x, LEGEND // 2 + 5), font, size, REFUSED, 1, cv2.LINE_AA)
+    return x + cv2.getTextSize(text, font, size, 1)[0][0] + 28
 
 
 def _canvas(image: NDArray[np.integer] | NDArray[np.floating], factor: int) -> NDArray[np.uint8]:

@@ -1,7 +1,10 @@
 """Results as a notebook shows them: the report's verdict and table in a cell."""
 
+from markupsafe import Markup
+
 from ..records.solution import Solution
-from . import report_sections as sections
+from .report_content import number_groups, verdict_of
+from .templating import render
 
 _STYLE = """
 .mitsuba-endo .badge { padding: 0 .5em; border-radius: .6em; background: #d5ebe4; color: #12382c; }
@@ -17,5 +20,7 @@ _STYLE = """
 
 def solution_html(solution: Solution) -> str:
     """Return verdict and values of a solution as a piece of HTML that brings its own style."""
-    body = sections.verdict(solution) + sections.number_table(solution)
-    return f'<style>{_STYLE}</style><div class="mitsuba-endo">{body}</div>'
+    return render(
+        "notebook.html", style=Markup(_STYLE), said=verdict_of(solution),
+        groups=number_groups(solution),
+    )  # fmt: skip

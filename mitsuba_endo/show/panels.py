@@ -1,7 +1,6 @@
 """What one pair of axes shows; each function draws into axes it is given."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import matplotlib
@@ -17,6 +16,7 @@ from ..geometry.cameras import CameraModel
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import FrameMaps, TraceRow
 from .colours import CAMERA, DEPTH, MISSING, PROJECTOR, RESIDUAL, UNUSED, banded, shaded
+from .surface_colours import UNCERTAINTY
 from .view import SurfaceView
 
 PX = "pattern px"
@@ -125,9 +125,9 @@ def surface_std(axes: Axes, view: SurfaceView, unit: str) -> None:
         raise ValueError("the surface has no standard deviations")
     finite = view.std[np.isfinite(view.std)]
     norm = Normalize(0, float(np.percentile(finite, 98)) if len(finite) else 1.0)
-    scale = matplotlib.colormaps["magma"].with_extremes(bad=MISSING)
+    scale = matplotlib.colormaps[UNCERTAINTY].with_extremes(bad=MISSING)
     axes.imshow(view.std, cmap=scale, norm=norm, interpolation="nearest")
-    _value_bar(axes, norm, "magma", f"standard deviation, {unit}", extend="max")
+    _value_bar(axes, norm, UNCERTAINTY, f"standard deviation, {unit}", extend="max")
     image_axes(axes, "Uncertainty of the surface")
 
 
@@ -186,16 +186,13 @@ def rig_section(
 
 
 def trace_cost(axes: Axes, trace: list[TraceRow]) -> None:
-    """Draw the robust cost per iteration; dotted lines where the robust scale changes."""
-    iterations = [row.iteration for row in trace]
-    axes.plot(iterations, [row.cost for row in trace], "o-", ms=3, color=CAMERA)
-    costs = np.array([row.cost for row in trace])
+    """Draw the cost per iteration under one loss, that of the end; of old traces their own."""
+    fixed = all(row.fixed_cost is not None for row in trace)
+    costs = np.array([row.fixed_cost if fixed else row.cost for row in trace], float)
+    axes.plot([row.iteration for row in trace], costs, "o-", ms=3, color=CAMERA)
     if len(costs) and costs.min() > 0 and costs.max() > 3 * costs.min():
         axes.set_yscale("log")
-    for before, after in pairwise(trace):
-        if after.scale_px != before.scale_px:
-            axes.axvline(after.iteration, color="0.6", lw=0.8, ls=":")
-    axes.set(ylabel="robust cost per correspondence")
+    axes.set(ylabel="cost per correspondence" + (",\nunder the final loss" if fixed else ""))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(color="0.9", lw=0.6)
 
@@ -213,7 +210,7 @@ def trace_focal(axes: Axes, trace: list[TraceRow]) -> None:
 
 
 def correlation(
-    axes: Axes, unknowns: list[str], values: NDArray[np.float64], numbers: bool
+    axes: Axes, unknowns: list[str], values: NDArray[np.float64], numbers: bool, title: str
 ) -> None:
     """Draw a correlation matrix (N, N), NaN in grey, with its numbers where there is room."""
     scale = matplotlib.colormaps[RESIDUAL].with_extremes(bad=MISSING)
@@ -228,7 +225,7 @@ def correlation(
                 colour = "w" if abs(value) > _DARK else "k"
                 text = f"{value:.2f}".replace("-0.00", "0.00")
                 axes.text(column, row, text, color=colour, size=6, ha="center", va="center")
-    size = "x-small" if len(unknowns) <= _DENSE else 4
+    size = "x-small" if len(unknowns) <= _DENSE else 7
     counted = [str(i + 1) for i in range(len(unknowns))]
     named = [f"{name}   {i}" for name, i in zip(unknowns, counted, strict=True)]
     axes.set_xticks(range(len(unknowns)), counted, size=size)
@@ -236,5 +233,5 @@ def correlation(
     axes.tick_params(length=0)
     axes.set_aspect("equal")
     axes.invert_yaxis()
-    axes.set_title("Correlation of the unknowns")
+    axes.set_title(title)
     axes.figure.colorbar(shown, ax=axes, shrink=0.6, aspect=25).ax.tick_params(labelsize="x-small")

@@ -17,7 +17,10 @@ from ..records.map_arrays import CHANNELS
 from ..records.solution import load_solution
 from ..records.surface import load_with_modes, own_surface_name
 from .map_names import map_names, observed_names
+from .photographs import StoredPhotographs
 
+DECODED = "decoded"
+"""Maps, photographs and pictures of the grids found, where images were given."""
 USED = "used"
 """Channel of the observed maps: 1 where the solver used the correspondence."""
 
@@ -80,6 +83,7 @@ def read_solution_folder(path: str | Path) -> Calibration:
     return Calibration(
         solution, solution.camera.to_model(), surface, frames, trace,
         own_surfaces=_own_surfaces(folder, len(names)), history=load_history(folder),
+        photographs=StoredPhotographs(folder / DECODED, names),
     )  # fmt: skip
 
 
@@ -121,6 +125,7 @@ def _trace(path: Path) -> list[TraceRow]:
                 int(row["iteration"]), float(row["seconds"]), float(row["cost"]),
                 float(row["focal"]) if row["focal"] else None, float(row["damping"]),
                 float(row["scale_px"]), float(row["step"]),
+                float(row["fixed_cost"]) if row.get("fixed_cost") else None,
             )
             for row in csv.DictReader(text.splitlines())
         ]  # fmt: skip

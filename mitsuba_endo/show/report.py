@@ -1,15 +1,17 @@
 """``report.html``: everything about one result, or several side by side, in one offline file."""
 
 from collections.abc import Sequence
-from html import escape
-from importlib import resources
 from pathlib import Path
+
+from markupsafe import Markup
 
 from ..evaluate.sequence_errors import TrackedFrames
 from ..files import atomic_path
 from ..records.calibration import Calibration
-from . import report_sections as sections
+from . import report_content as content
+from . import report_pictures as pictures
 from .result_scene import ResultScene
+from .templating import asset, render
 from .truth import load_truth
 from .view import SurfaceView, view_surface
 
@@ -51,40 +53,44 @@ def _page(
     views: Sequence[SurfaceView],
     tracks: Sequence[TrackedFrames | None],
 ) -> str:
-    several = len(scenes) > 1
-    compared = ""
-    if several:
-        table = sections.comparison(names, [c.calibration.solution for c in scenes])
-        compared = f"<h3>Compared, with 95 % intervals</h3>{table}<p></p>"
-    articles = "".join(
-        _article(i, *of) for i, of in enumerate(zip(names, scenes, views, tracks, strict=True))
-    )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<link rel="icon" href="data:,">'
-        f"<title>Calibration: {escape(', '.join(names))}</title><style>{_asset('report.css')}"
-        f"</style></head><body{' class=many' if several else ''}>"
-        f"<h1>Calibration {'results' if several else 'result'}</h1>"
-        '<p class="lead">mitsuba-endo; camera frame: x right, y down, z forward; '
-        "X_projector = R X_camera + t</p>"
-        f'{compared}<main class="results">{articles}</main>'
-        f"<script>{_asset('report.js')}</script></body></html>\n"
-    )
+    solutions = [scene.calibration.solution for scene in scenes]
+    articles = [
+        _article(i, *of, alone=len(scenes) == 1)
+        for i, of in enumerate(zip(names, scenes, views, tracks, strict=True))
+    ]
+    return render(
+        "report.html", names=names, articles=articles, style=asset("report.css"),
+        script=asset("report.js"),
+        compared=content.comparison(solutions) if len(solutions) > 1 else [],
+    )  # fmt: skip
 
 
 def _article(
-    number: int, name: str, scene: ResultScene, view: SurfaceView, track: TrackedFrames | None
-) -> str:
+    number: int,
+    name: str,
+    scene: ResultScene,
+    view: SurfaceView,
+    track: TrackedFrames | None,
+    alone: bool,
+) -> Markup:
     calibration, solution = scene.calibration, scene.calibration.solution
-    return (
-        f'<article class="result"><h2>{escape(name)}</h2>{sections.verdict(solution)}'
-        f"{sections.model(solution)}{sections.track(track)}"
-        f"<h3>Observed, rendered, residual</h3>{sections.viewer(calibration, number)}"
-        f"<h3>Numbers</h3>{sections.number_table(solution)}{sections.charts(scene, view, number)}"
-        f"<h3>Provenance</h3>{sections.provenance(solution)}</article>"
-    )
+    groups, folded = content.number_groups(solution), []
+    if len(solution.frames) > content.FOLDED:
+        frames = {frame.name for frame in solution.frames}
+        groups, folded = (
+            [g for g in groups if (g[0] in frames) == of_frames] for of_frames in (False, True)
+        )
+    return render(
+        "result.html", name=name, alone=alone, said=content.verdict_of(solution),
+        scene=pictures.scene_of(scene, view, number), maps=pictures.viewer(calibration, number),
+        photographed=bool(calibration.photographs), model=model_section(calibration),
+        frame_charts=pictures.frames_over_time(calibration), groups=groups, folded=folded,
+        surfaces=pictures.surfaces(scene, view), charts=pictures.charts(scene, view),
+        provenance=content.provenance_of(solution), track=pictures.track_of(track),
+    )  # fmt: skip
 
 
-def _asset(name: str) -> str:
-    return resources.files("mitsuba_endo.show").joinpath(name).read_text(encoding="utf-8")
+def model_section(calibration: Calibration) -> Markup:
+    """Return what may be wrong with the model, empty where nothing is suspected."""
+    solution = calibration.solution
+    return render("model.html", model=solution.model, candidates=content.candidates(solution))

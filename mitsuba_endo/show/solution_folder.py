@@ -3,7 +3,7 @@
 import csv
 import shutil
 from collections.abc import Sequence
-from dataclasses import astuple, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +24,14 @@ from ..records.trajectory import save_frames
 from . import figures
 from .extras import EXTRAS, check_extras
 from .map_names import map_names, observed_names
-from .read_folder import save_observed
+from .photographs import StoredPhotographs, photograph_path, save_photograph
+from .read_folder import DECODED, save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
 from .trajectory_files import FRAMES, frame_rows, save_trajectories
 from .view import view_surface
 
 SCENE = "scene.xml"
-DECODED = "decoded"
-"""Maps and pictures of the grids found, where images were given."""
 
 
 def write_solution_folder(
@@ -101,11 +100,22 @@ def write_solution_folder(
         if rig is not None:
             save_rig(folder / "rig.yaml", rig)
         figures.save_figure(folder / "overview.png", figures.overview_figure(calibration, view))
-        shown = replace(calibration, solution=solution)
-        save_report(folder / REPORT, [(Path(path).name, shown)], [view])
         if decoded is not None:
             shutil.copytree(decoded, folder / DECODED)
+        _save_photographs(folder / DECODED, calibration)
+        photographs = StoredPhotographs(folder / DECODED, names)
+        shown = replace(calibration, solution=solution, photographs=photographs)
+        save_report(folder / REPORT, [(Path(path).name, shown)], [view])
     return solution
+
+
+def _save_photographs(folder: Path, calibration: Calibration) -> None:
+    """Write the photographs that a calibration brings and its folder does not hold yet."""
+    for name, image in calibration.photographs.items():
+        path = photograph_path(folder, name)
+        if not path.exists():
+            folder.mkdir(exist_ok=True)
+            save_photograph(path, np.asarray(image[..., ::-1] / np.float32(255)))
 
 
 def _save_modes(folder: Path, calibration: Calibration) -> None:
@@ -120,8 +130,9 @@ def save_trace(path: str | Path, trace: list[TraceRow]) -> None:
     """Write the iterations as CSV; an empty field is a value that does not exist."""
     with atomic_path(path) as aside, aside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(f.name for f in fields(TraceRow))
-        writer.writerows(astuple(row) for row in trace)
+        names = [f.name for f in fields(TraceRow) if f.name != "lengths"]
+        writer.writerow(names)
+        writer.writerows([getattr(row, name) for name in names] for row in trace)
 
 
 def save_rig(path: Path, rig: Rig) -> None:

@@ -50,7 +50,8 @@ def _frame(frame: Frame, units: str, gives_scale: bool) -> list[Row]:
     if pose is not None:
         length = "mm" if units == "mm" else "baselines"
         status = "fixed" if gives_scale else frame.projector_from_camera.status
-        out.append(Row(frame.name, "baseline", f"{np.linalg.norm(pose.t):.5g}", "", length, status))
+        value, half = _baseline(frame, gives_scale)
+        out.append(Row(frame.name, "baseline", value, half, length, status))
     if frame.world_from_camera.status != "fixed":
         out += _pose(frame.name, "camera", frame.world_from_camera, units)
     if frame.rms_px is not None:
@@ -59,6 +60,14 @@ def _frame(frame: Frame, units: str, gives_scale: bool) -> list[Row]:
     if frame.outliers is not None:
         out.append(Row(frame.name, "pixels not used", f"{100 * frame.outliers:.2g}", "", "%", ""))
     return out
+
+
+def _baseline(frame: Frame, given: bool) -> tuple[str, str]:
+    """Return the length of a frame's baseline and its interval, empty where it was given."""
+    pose = frame.projector_from_camera
+    length = float(np.linalg.norm(np.array(pose.t, float)))
+    std = None if given else pose.length_std()
+    return interval(length, std) if std else (f"{length:.5g}", "")
 
 
 def _estimate(group: str, quantity: str, estimate: Estimate, unit: str) -> list[Row]:
@@ -116,7 +125,8 @@ def headline(solution: Solution) -> str:
         parts.append("projector pose unknown")
     elif solution.units == "mm":
         given = " (given)" if solution.scale == "baseline" else ""
-        parts.append(f"baseline {np.linalg.norm(pose.t):.5g} mm{given}")
+        value, half = _baseline(solution.frames[0], bool(given))
+        parts.append(f"baseline {' '.join(filter(None, (value, half)))} mm{given}")
     else:
         parts.append("up to scale")
     rms = [f.rms_px for f in solution.frames if f.rms_px is not None]

@@ -12,7 +12,8 @@ from .colours import DEPTH, MISSING, RESIDUAL
 
 Floats = NDArray[np.float64]
 
-UNCERTAINTY = "magma"
+UNCERTAINTY = "YlOrBr"
+"""Bright is certain: near walls, the most certain ones, would be black otherwise."""
 _SHARE = 98
 """Percentile at which a scale ends: a few outliers would take all the colours."""
 
@@ -64,7 +65,7 @@ class Shown:
 def uncertainty(stds: list[Floats], unit: str) -> Shown:
     """Show standard deviations (V,), the unit given."""
     top = _top(stds)
-    label = f"standard deviation along the camera's rays, {unit}; bright is uncertain"
+    label = f"standard deviation along the camera's rays, {unit}; dark is uncertain"
     return Shown("uncertainty", label, stds, 0.0, top, UNCERTAINTY)
 
 

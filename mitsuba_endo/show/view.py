@@ -23,6 +23,8 @@ class SurfaceView:
     """(H, W, 3) smooth unit normals, towards the camera."""
     std: Floats | None
     """(H, W) standard deviation of the surface along the ray, the surface's unit."""
+    modes: Floats | None = None
+    """(H, W, K) the part of ``std`` that all points share, see :class:`SurfaceEstimate`."""
 
     @property
     def depth(self) -> Floats:
@@ -50,7 +52,12 @@ def view_surface(surface: SurfaceEstimate, camera: CameraModel) -> SurfaceView:
         std = np.full(len(flat), np.nan)
         std[seen] = np.sum(weights * surface.std[corners], -1)
         std = std.reshape(rays.shape[:2])
-    return SurfaceView(points.reshape(rays.shape), normals.reshape(rays.shape), std)
+    modes = None
+    if surface.modes is not None:
+        modes = np.full((len(flat), surface.modes.shape[1]), np.nan)
+        modes[seen] = np.einsum("nk,nkm->nm", weights, surface.modes[corners])
+        modes = modes.reshape(*rays.shape[:2], -1)
+    return SurfaceView(points.reshape(rays.shape), normals.reshape(rays.shape), std, modes)
 
 
 def range_of(surface: SurfaceEstimate, camera: CameraModel) -> Floats:

@@ -55,6 +55,8 @@ class MapPages:
     images: list[list[MapImages]]
     coordinate_scales: list[ColourBar]
     residual_scale: ColourBar
+    shrink: float
+    """By which images are smaller than the maps."""
 
 
 def map_pages(frames: Sequence[FrameMaps]) -> MapPages:
@@ -82,7 +84,7 @@ def map_pages(frames: Sequence[FrameMaps]) -> MapPages:
     ]
     note = "observed - rendered, pattern px; dark grey: not used"
     residuals = _scale(matplotlib.colormaps[RESIDUAL], Normalize(-limit, limit), note)
-    return MapPages(images, bars, residuals)
+    return MapPages(images, bars, residuals, shrink)
 
 
 def figure_svg(figure: Figure) -> str:
@@ -100,6 +102,11 @@ def figure_image(figure: Figure) -> str:
     image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
     assert image is not None
     return _uri(image[..., ::-1].astype(np.float64) / 255, 1.0)
+
+
+def photograph_uri(image: NDArray[np.uint8], shrink: float) -> str:
+    """Return a photograph (H, W, 3), RGB, made smaller by a factor, as a data URI."""
+    return _uri(image.astype(np.float64) / 255, shrink)
 
 
 def _coloured(q: NDArray[Any], colours: Any, norm: Normalize) -> NDArray[np.float64]:

@@ -3,10 +3,11 @@
 import base64
 import json
 import math
-from html import escape
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
@@ -15,16 +16,29 @@ from .colours import CAMERA, PROJECTOR, shaded
 from .frame_poses import Floats, FramePoses, camera_corners, pyramid, solution_corners
 from .result_scene import ResultScene, seen_from
 from .surface_colours import Shown
+from .templating import render
 from .view import SurfaceView, range_of
 
-_POINTS = 12_000
+_POINTS = 18_000
 """Of one surface; of several together twice as many."""
+_LARGEST = 32_000
+"""Of a quantised number: within 16 bits."""
 _TRUTH = "#3a3a3a"
 _STEEPEST = 12.0
 """Slope against the image, beyond which neighbouring pixels see two surfaces and not one."""
 
 
-def scene_canvas(scene: ResultScene, views: list[SurfaceView], number: int = 0) -> str:
+@dataclass(frozen=True, eq=False)
+class Paint:
+    """What the surfaces can be coloured by."""
+
+    name: str
+    legend: Markup
+    colours: list[str]
+    """RGB of every surface's points, bytes in base 64."""
+
+
+def scene_canvas(scene: ResultScene, views: list[SurfaceView], number: int = 0) -> Markup:
     """Return a canvas, with its controls, that report.js turns into a view to be turned.
 
     Drawn is what the cameras see of their surfaces: points in the first camera's frame, and
@@ -36,34 +50,34 @@ def scene_canvas(scene: ResultScene, views: list[SurfaceView], number: int = 0) 
         number: of the result on its page.
     """
     if not any(np.isfinite(view.depth).any() for view in views):
-        return "<p>The cameras see nothing of the surfaces.</p>"
+        return Markup("<p>The cameras see nothing of the surfaces.</p>")
     room = _POINTS if len(views) == 1 else 2 * _POINTS // len(views)
     steps = [_step(view, room) for view in views]
     kept = [_thinned(*args) for args in zip(views, steps, strict=True)]
-    quantities = _quantities(scene, views, kept)
+    paints = [*_photograph_paint(scene, kept), *_paints(scene, views, kept)]
+    solution = scene.calibration.solution
     data = {
         "surfaces": [
             _surface(scene, *args) for args in zip(range(len(views)), views, steps, strict=True)
         ],
-        "colours": [
-            [
-                _base64(_painted(q, s, v, k))
-                for s, (v, k) in enumerate(zip(views, kept, strict=True))
-            ]
-            for q in quantities
-        ],
+        "colours": [paint.colours for paint in paints],
         "lines": _lines(scene),
+        "unit": scene.unit,
+        "scaleStd": solution.scale_std_percent / 100,
     }
-    frames = [at.name for at in scene.poses]
-    return (
-        f'<div class="space" data-scene="{escape(json.dumps(data))}" '
-        f'data-frames="{escape(json.dumps(frames))}">'
-        f"{_controls(scene, quantities, number)}"
-        '<canvas class="scene"></canvas>'
-        + "".join(f'<div class="legend"{" hidden" * (i > 0)}>{q.legend()}</div>'
-                  for i, q in enumerate(quantities))
-        + f"<figcaption>{_caption(scene)}</figcaption></div>"
+    names = [at.name for at in scene.poses]
+    return render(
+        "scene.html", data=json.dumps(data), frames=names, paints=paints, number=number,
+        least=1 if len(scene.surfaces) > 1 else 0, truth=scene.truth is not None,
+        unit=scene.unit, photographed=_photographed(scene),
     )  # fmt: skip
+
+
+def _photographed(scene: ResultScene) -> str:
+    """Return the name of the frame whose photograph lies on the surface that all share."""
+    first = scene.poses[0].name
+    known = scene.calibration.photographs
+    return first if len(scene.surfaces) == 1 and len(scene.poses) > 1 and first in known else ""
 
 
 def _step(view: SurfaceView, room: int) -> int:
@@ -78,10 +92,52 @@ def _thinned(view: SurfaceView, step: int) -> NDArray[np.bool_]:
     return kept & np.isfinite(view.depth)
 
 
-def _surface(scene: ResultScene, index: int, view: SurfaceView, step: int) -> dict[str, str]:
-    points = scene.first_from_surface(index).apply(view.points[_thinned(view, step)])
-    quads = _quads(view.points[::step, ::step])
-    return {"points": _base64(points.astype("<f4")), "quads": _base64(quads.astype("<u2"))}
+def _surface(scene: ResultScene, index: int, view: SurfaceView, step: int) -> dict[str, Any]:
+    kept, placed = _thinned(view, step), scene.first_from_surface(index)
+    points, quads = placed.apply(view.points[kept]), _quads(view.points[::step, ::step])
+    out: dict[str, Any] = {
+        "points": _base64(points.astype("<f4")), "quads": _base64(quads.astype("<u2")),
+        "origin": placed.t.tolist(),
+    }  # fmt: skip
+    if view.std is None:
+        return out
+    shared = None if view.modes is None else view.modes[kept]
+    own = view.std[kept] ** 2 - (0.0 if shared is None else np.sum(shared**2, -1))
+    out["own"] = _quantised(np.sqrt(np.maximum(own, 0.0)))
+    if shared is not None:
+        out["modes"] = _quantised(shared)
+    return out
+
+
+def _quantised(values: Floats) -> dict[str, Any]:
+    """Return numbers (...) as 16-bit integers and their unit; the ruler needs three digits."""
+    unit = max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-12) / _LARGEST
+    whole = np.round(np.nan_to_num(values) / unit).astype("<i2")
+    return {"unit": unit, "data": _base64(whole)}
+
+
+def _photograph_paint(scene: ResultScene, kept: list[NDArray[np.bool_]]) -> list[Paint]:
+    """Return the photographs on the surfaces, where every surface's frame has one of its size."""
+    images = []
+    for frame, points in enumerate(kept):
+        image = scene.calibration.photographs.get(scene.poses[frame].name)
+        if image is None or image.shape[:2] != points.shape:
+            return []
+        images.append(_base64(np.ascontiguousarray(image[points])))
+    return [Paint("photograph", Markup(""), images)]
+
+
+def _paints(
+    scene: ResultScene, views: list[SurfaceView], kept: list[NDArray[np.bool_]]
+) -> list[Paint]:
+    pairs = list(zip(views, kept, strict=True))
+    return [
+        Paint(
+            q.name, Markup(q.legend()),
+            [_base64(_painted(q, s, v, k)) for s, (v, k) in enumerate(pairs)],
+        )
+        for q in _quantities(scene, views, kept)
+    ]  # fmt: skip
 
 
 def _quads(points: Floats) -> NDArray[np.int64]:
@@ -104,7 +160,7 @@ def _quads(points: Floats) -> NDArray[np.int64]:
 def _quantities(
     scene: ResultScene, views: list[SurfaceView], kept: list[NDArray[np.bool_]]
 ) -> list[Shown]:
-    """Return what the points can be coloured by: of uncertainty, error, and else depth."""
+    """Return what the points can be coloured by: uncertainty, error, depth."""
     pairs = list(zip(views, kept, strict=True))
     out = []
     if all(view.std is not None for view in views):
@@ -114,7 +170,7 @@ def _quantities(
     if truth is not None and truth.surface is not None:
         errors = [view_error(scene, s, view)[k] for s, (view, k) in enumerate(pairs)]
         out.append(surface_colours.error(errors, scene.unit, truth.alignment))
-    return out or [surface_colours.depth([view.points[k] for view, k in pairs], scene.unit)]
+    return [*out, surface_colours.depth([view.points[k] for view, k in pairs], scene.unit)]
 
 
 def view_error(scene: ResultScene, surface: int, view: SurfaceView) -> Floats:
@@ -167,40 +223,6 @@ def _frusta(
 def _line(colour: str, kind: str, frame: int, segments: Floats) -> dict[str, Any]:
     rounded = np.round(segments, 6 if kind == "frusta" else 3).tolist()
     return {"colour": colour, "kind": kind, "frame": frame, "segments": rounded}
-
-
-def _controls(scene: ResultScene, quantities: list[Shown], number: int) -> str:
-    out = ""
-    frames = len(scene.poses)
-    if frames > 1:
-        least = 1 if len(scene.surfaces) > 1 else 0
-        out += (
-            f'<label>Frame <input type="range" name="shown" min="{least}" max="{frames}" '
-            f'value="{least}" step="1"></label><output></output>'
-        )
-    if len(quantities) > 1:
-        out += "".join(
-            f'<label><input type="radio" name="colour-{number}" value="{i}"'
-            f"{' checked' * (i == 0)}> {escape(q.name)}</label>"
-            for i, q in enumerate(quantities)
-        )
-    boxes = [("frusta", True), ("rays", False)]
-    if scene.truth is not None:
-        boxes.append(("truth", False))
-    out += "".join(
-        f'<label><input type="checkbox" name="{name}"{" checked" * on}> {name}</label>'
-        for name, on in boxes
-    )
-    return f'<div class="controls">{out}</div>'
-
-
-def _caption(scene: ResultScene) -> str:
-    truth = "; dark: their true places" if scene.truth is not None else ""
-    return (
-        f"Blue: camera; orange: projector{truth}. Rays: some correspondences, up to where both rays"
-        f" of each pass most closely. Lengths in {scene.unit}. Drag to turn, wheel to zoom, "
-        "double click to reset."
-    )
 
 
 def _base64(array: NDArray[Any]) -> str:

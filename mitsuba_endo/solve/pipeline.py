@@ -11,7 +11,13 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut, Outcome
 from .costs.objective import Problem, make_problem
 from .costs.registry import priors_of
-from .frames.initial_poses import common_start, usable_starts, without_faults, without_repeats
+from .frames.initial_poses import (
+    OnFrame,
+    common_start,
+    usable_starts,
+    without_faults,
+    without_repeats,
+)
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
 from .frames.joint_mesh import joint_mesh_problem
 from .frames.restart import with_restarts
@@ -21,7 +27,7 @@ from .frames.single_frames import solve_alone
 from .history import History
 from .inference.covariance import uncertainty
 from .inference.fit import Fit, FrameSolution
-from .inference.frame_consistency import consistencies, worst
+from .inference.frame_consistency import consistencies, doubtful_frames, worst
 from .inference.model_error.analysis import check_model
 from .inference.observability import Direction
 from .inference.predicted_observability import predicted_directions
@@ -88,7 +94,7 @@ def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Optimised:
 def _own_surfaces(job: Job, say: Progress) -> Optimised:
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = _starts(job)
+        maps, starts, left_out = _starts(job, _frames_of(say, 0.05, 0.4, "Searching for a start"))
         layout = job.layout(len(maps))
         if len(maps) > 1 and layout.sharing("projector_pose") != "per_frame":
             share_focal = layout.sharing("focal") != "per_frame"
@@ -132,20 +138,40 @@ def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameSolution], list[Le
     """Start and solve every frame alone; name those that cannot be used."""
     say(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = _starts(job)
+        maps, starts, left_out = _starts(job, _frames_of(say, 0.05, 0.3, "Searching for a start"))
     say(0.3, "Solving every frame alone")
     with job.timed("frames"):
         layout = job.layout(len(maps))
-        alone = solve_alone(maps, starts, job.camera, job.rig, layout, job.law, job.options)
+        told = _frames_of(say, 0.3, 0.5, "Solving every frame alone")
+        alone = solve_alone(maps, starts, job.camera, job.rig, layout, job.law, job.options, told)
     return alone, left_out
 
 
-def _starts(job: Job) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
+def _frames_of(say: Progress, begin: float, end: float, step: str) -> OnFrame:
+    """Return a callback that tells the frames of a step, of a part of the progress bar."""
+
+    def told(frame: int, count: int) -> None:
+        of = f", frame {frame} of {count}" if count > 1 else ""
+        say(begin + (end - begin) * (frame - 1) / count, f"{step}{of}")
+
+    return told
+
+
+def _starts(
+    job: Job, on_frame: OnFrame
+) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
     """Start the frames that can be used; name the others."""
     sound, faulty = without_faults(job.maps, job.rig)
     unique, repeated = without_repeats(sound)
     maps, starts, failed = usable_starts(
-        unique, job.camera, job.rig, job.layout(len(unique)), job.law, job.options, job.starts
+        unique,
+        job.camera,
+        job.rig,
+        job.layout(len(unique)),
+        job.law,
+        job.options,
+        job.starts,
+        on_frame,
     )
     return maps, starts, [*faulty, *repeated, *failed]
 
@@ -180,7 +206,7 @@ def _optimise_joint(
         left_out.append(LeftOut(name=alone[wrong].name, reason=judged[wrong].reason))
         alone = [a for k, a in enumerate(alone) if k != wrong]
         registered = [p for k, p in enumerate(registered) if k != wrong]
-    doubts = [f"do not rely on frame {c.name}: {c.reason}" for c in judged if c.doubtful]
+    doubts = doubtful_frames(judged)
     names = {a.name for a in alone}
     maps = [m for m in job.maps if m.name in names]
     return Optimised(maps, left_out, doubts, result, predicted)

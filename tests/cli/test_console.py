@@ -112,3 +112,33 @@ def test_version():
     from importlib.metadata import version
 
     assert run("--version").stdout == version("mitsuba-endo") + "\n"
+
+
+def test_long_work_tells_its_steps_in_a_log(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    """Oracle: by hand, with a clock of the test's own: nothing of the first two seconds; a line for
+    each step and frame; of one step's iterations a line in ten seconds."""
+    from mitsuba_endo.cli import console
+
+    now = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    with console.Session(False, False).progress("Starting") as advance:
+        for seconds, step in (
+            (1.0, "Searching, frame 1 of 3"), (3.0, "Searching, frame 2 of 3"),
+            (3.5, "Searching, frame 3 of 3"), (4.0, "Optimising (iteration 1, f = 3.1 px)"),
+            (5.0, "Optimising (iteration 2, f = 3.0 px)"),
+            (15.0, "Optimising (iteration 3, f = 3.0 px)"),
+        ):  # fmt: skip
+            now[0] = seconds
+            advance(0.5, step)
+    assert capsys.readouterr().err.splitlines() == [
+        "[   3.0 s] Searching, frame 2 of 3",
+        "[   3.5 s] Searching, frame 3 of 3",
+        "[   4.0 s] Optimising (iteration 1, f = 3.1 px)",
+        "[  15.0 s] Optimising (iteration 3, f = 3.0 px)",
+    ]
+    with console.Session(True, False).progress("Starting") as advance:
+        now[0] = 99.0
+        advance(0.5, "Optimising")
+    assert capsys.readouterr().err == ""

@@ -105,7 +105,7 @@ def _trace() -> list[TraceRow]:
     return [
         TraceRow(
             i, 0.2 * i, 0.5 + 40 * 0.3**i, FOCAL * (1 - 0.1 * 0.4**i), 10.0 ** (-i),
-            5.0 if i < 4 else 1.0, 0.3**i,
+            5.0 if i < 4 else 1.0, 0.3**i, 0.5 + 50 * 0.3**i if i else None,
         )
         for i in range(9)
     ]  # fmt: skip

@@ -25,8 +25,7 @@ from mitsuba_endo.records.calibration import Calibration
 from mitsuba_endo.records.solution import Estimate, LeftOut, Outcome, PoseEstimate, save_solution
 from mitsuba_endo.records.surface import save_surface
 from mitsuba_endo.show.read_folder import read_solution_folder
-from mitsuba_endo.show.report import save_report
-from mitsuba_endo.show.report_sections import model
+from mitsuba_endo.show.report import model_section, save_report
 from mitsuba_endo.show.result_scene import ResultScene
 from mitsuba_endo.show.solution_folder import write_solution_folder
 from mitsuba_endo.show.truth import load_truth
@@ -283,7 +282,7 @@ def test_own_surfaces_stand_where_their_cameras_are(
         assert len(points) > 2000
         inner = np.abs(points[:, :2]).max(1) < 40
         assert distance_to_mesh(points[inner], sheet.vertices, sheet.faces).max() < 1e-3
-    assert [len(colours) for colours in data["colours"]] == [3]
+    assert [len(colours) for colours in data["colours"]] == [3, 3]
 
 
 def _write_truth(folder: Path, calibration: Calibration, farther: float) -> Path:
@@ -382,7 +381,7 @@ window.addEventListener("load", () => {
     before > 0.02 && after > 0.005 && after < 0.6 * before,
     shown.map((p) => p.dataset.frame + p.dataset.coordinate).join(),
     getComputedStyle(shown[0].querySelector("img + img")).opacity,
-    document.querySelector("output").textContent, broken, window.faults.join() || "none",
+    document.querySelector(".viewer output").textContent, broken, window.faults.join() || "none",
     document.documentElement.scrollWidth <= window.innerWidth,
   ];
   const note = document.createElement("p");
@@ -427,7 +426,158 @@ def test_the_model_s_candidates_are_listed_with_what_is_known_of_them(
     whole = {**one, "words": "projector centre", "value": None, "std": None, "group": []}
     found = {"suspected": True, "structure": 0.3, "expected": 0.06, "intervals_by": 2.0,
              "candidates": [one, whole]}  # fmt: skip
-    text = model(make_calibration().solution.model_copy(update={"model": found}))
+    made = make_calibration()
+    solution = made.solution.model_copy(update={"model": found})
+    text = str(model_section(replace(made, solution=solution)))
     assert "-0.01 ± 0.001" in text
     assert "<tr><th>projector centre</th><td></td><td>90 %</td><td></td></tr>" in text
     assert "inf" not in text.replace("information", "")
+
+
+def _with_photographs(calibration: Calibration) -> Calibration:
+    """Give every frame a photograph whose red is its number and whose green grows to the right."""
+    shown = {}
+    for k, frame in enumerate(calibration.frames):
+        height, width = frame.observed.shape[:2]
+        image = np.zeros((height, width, 3), np.uint8)
+        image[..., 0] = 40 + 4 * k
+        image[..., 1] = np.linspace(0, 255, width)
+        shown[frame.name] = image
+    return replace(calibration, photographs=shown)
+
+
+def test_photographs_stand_beside_their_maps_and_on_the_surface(
+    calibration: Calibration, tmp_path: Path
+):
+    """Oracle: the photograph's own pixels at the points' projections; one picture a frame."""
+    made = _with_photographs(calibration)
+    save_report(tmp_path / "r.html", [("x", made)])
+    text = (tmp_path / "r.html").read_text(encoding="utf-8")
+    for frame in made.frames:
+        assert text.count(f'alt="photograph {frame.name}"') == 1
+    data = _scene(text)
+    points = _points(data["surfaces"][0])
+    at = np.round(made.camera.project(points)).astype(int)
+    image = made.photographs[made.frames[0].name]
+    painted = np.frombuffer(base64.b64decode(data["colours"][0][0]), np.uint8).reshape(-1, 3)
+    np.testing.assert_array_equal(painted, image[at[:, 1], at[:, 0]])
+    assert "The photograph is that of run/frame_0.exr" in text
+
+
+def test_photographs_are_kept_in_the_folder(calibration: Calibration, tmp_path: Path):
+    """Oracle: what was given, but for JPEG and the stretch to white."""
+    made = _with_photographs(calibration)
+    write_solution_folder(tmp_path / "out", made)
+    read = read_solution_folder(tmp_path / "out").photographs
+    assert list(read) == [frame.name for frame in made.frames]
+    for name, image in made.photographs.items():
+        assert np.abs(read[name].astype(float) - image).mean() < 4
+    assert "photograph run/frame_2.exr" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_the_drawn_cost_falls():
+    """Oracle: residuals that halve: the cost under the loss of the end falls with each step, also
+    where the loss that was minimised changed, and missed correspondences cost the most."""
+    from mitsuba_endo.records.calibration import TraceRow
+    from mitsuba_endo.solve.costs.robust_loss import NoiseScale
+    from mitsuba_endo.solve.minimisers.result import with_fixed_cost
+
+    base = np.abs(np.random.default_rng(0).normal(size=256))
+    rows = [
+        TraceRow(i, 0.1, cost, 900.0, 1.0, 1.0, 1.0, lengths=tuple((base * 0.5**i).tolist()))
+        for i, cost in enumerate((0.9, 1.3, 1.2, 1.4))
+    ]
+    missed = replace(rows[0], lengths=(float("inf"),) * 256)
+    noise = NoiseScale(0.2, "tukey", last=True)
+    costs = [row.fixed_cost for row in with_fixed_cost([missed, *rows], noise)]
+    assert None not in costs
+    assert costs == sorted(costs, reverse=True)  # type: ignore[type-var]
+    assert costs[0] == pytest.approx(6.5**2 / 6)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium installed")
+def test_the_ruler_says_what_the_package_says(make_calibration: Maker, tmp_path: Path):
+    """Oracle: ``show.measure.distance`` of the same two points, with shared errors and a unit that
+    is known to 1 %; in Chromium."""
+    from mitsuba_endo.show.measure import distance, pick
+    from mitsuba_endo.show.solution_values import interval
+    from scripts.benchmarks.chromium import browser
+
+    made = make_calibration()
+    std = made.surface.std
+    assert std is not None
+    modes = np.random.default_rng(0).normal(size=(6, 1)) * 0.3 * std[:, None].T
+    surface = replace(made.surface, modes=modes.T)
+    solution = made.solution.model_copy(update={"scale_std_percent": 1.0})
+    made = replace(made, surface=surface, solution=solution)
+    save_report(tmp_path / "r.html", [("x", made)])
+    points = _points(_scene((tmp_path / "r.html").read_text(encoding="utf-8"))["surfaces"][0])
+    chosen = [len(points) // 3, 2 * len(points) // 3 + 40]
+    ends = [pick(surface, np.zeros(3), points[i]) for i in chosen]
+    assert ends[0] is not None
+    assert ends[1] is not None
+    expected = distance(surface, ends[0], ends[1], 1.0)
+    script = (
+        "(() => { const data = JSON.parse(document.querySelector('.space').dataset.scene);"
+        "const s = data.surfaces[0];"
+        "return measured(new Float32Array(decoded(s.points)), s.origin, deviations(s), data,"
+        f" {chosen[0]}, {chosen[1]}); }})()"
+    )
+    with browser(1400, 900) as page:
+        page.open((tmp_path / "r.html").as_uri())
+        told = page.evaluate(script)
+        assert page.faults == []
+    length, half = (float(x) for x in told.removesuffix(" mm").split(" ± "))
+    assert length == pytest.approx(expected.value, rel=2e-3)
+    assert expected.std is not None
+    assert half == pytest.approx(1.96 * expected.std, rel=0.03)
+    assert told.endswith(" mm")
+    assert interval(expected.value, expected.std)[0]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium installed")
+@pytest.mark.parametrize("count", [1, 4, 20, 50])
+def test_the_first_picture_needs_no_scrolling(make_calibration: Maker, tmp_path: Path, count: int):
+    """Oracle: Chromium with a window of 1400 x 900: the scene ends above the window's edge, the
+    page has no error and is below 8 MB, whatever the number of frames and sentences."""
+    from scripts.benchmarks.chromium import browser
+
+    made = _with_photographs(make_calibration(width=160, height=120, count=count))
+    sentences = [f"Projector pose of frame {k}: t = (-6, 1, 2) mm." for k in range(2 * count)]
+    unknowns = [
+        f"projector pose of frame {k} (translation {a})" for k in range(count) for a in "xyz"
+    ]
+    correlation = {"unknowns": unknowns, "matrix": np.eye(3 * count).tolist()}
+    solution = made.solution.model_copy(
+        update={
+            "verdict": sentences, "warnings": sentences,
+            "observability": {"correlation": correlation},
+        }
+    )  # fmt: skip
+    save_report(tmp_path / "r.html", [("x", replace(made, solution=solution))])
+    assert (tmp_path / "r.html").stat().st_size < 8_000_000
+    with browser(1400, 900) as page:
+        page.open((tmp_path / "r.html").as_uri())
+        bottom = page.evaluate(
+            "document.querySelector('canvas.scene').getBoundingClientRect().bottom"
+        )
+        broken = page.evaluate("[...document.images].filter((i) => !i.naturalWidth).length")
+        assert bottom <= 900
+        assert broken == 0
+        assert page.faults == []
+        assert page.requests == [(tmp_path / "r.html").as_uri()]
+
+
+def test_names_are_no_markup(calibration: Calibration, tmp_path: Path):
+    """Oracle: a frame and a result called as a script are text in every section and attribute."""
+    evil = "<script>alert(1)</script>\"'"
+    frames = [f.model_copy(update={"name": evil + str(k)})
+              for k, f in enumerate(calibration.solution.frames)]  # fmt: skip
+    maps = [replace(m, name=evil + str(k)) for k, m in enumerate(calibration.frames)]
+    solution = calibration.solution.model_copy(update={"frames": frames, "verdict": [evil]})
+    made = replace(calibration, solution=solution, frames=maps)
+    save_report(tmp_path / "r.html", [(evil, made), (evil + "2", made)])
+    page = Page((tmp_path / "r.html").read_text(encoding="utf-8"))
+    assert page.tags.count("script") == 1
+    assert page.words.count(evil) > 6
+    assert f"data-frames='{evil}" not in (tmp_path / "r.html").read_text(encoding="utf-8")

@@ -98,3 +98,21 @@ def test_contradiction_is_a_doubt_and_says_so() -> None:
     assert "alone it gives another projector pose" in found.reason
     assert "1e-06" in found.reason
     assert not Consistency("frame", 0.5, 1.01, 0.0, chance=0.02).doubtful
+
+
+def test_frames_that_all_fit_alike_are_not_each_accused():
+    """Oracle: of four frames with one ratio none is named; a single one is, with what to do."""
+    from mitsuba_endo.solve.inference.frame_consistency import Consistency, doubtful_frames
+
+    names = ["a", "b", "c", "d"]
+    all_alike = [Consistency(name, 0.9, ratio, 0.0)
+                 for name, ratio in zip(names, (1.32, 1.5, 1.4, 1.35), strict=True)]  # fmt: skip
+    (said,) = doubtful_frames(all_alike)
+    assert said.startswith("4 of 4 frames fit the common surface 1.3 to 1.5 times worse than")
+    assert "share surface=per_frame" in said
+    one = [Consistency("a", 0.9, 1.5, 0.0), *(Consistency(n, 0.9, 1.0, 0.0) for n in names[1:])]
+    (said,) = doubtful_frames(one)
+    assert said.startswith("do not rely on frame a:")
+    assert said.endswith("the other poses are told from its camera, so calibrate without it")
+    (said,) = doubtful_frames([one[1], one[0], one[2]])
+    assert said.endswith("calibrate without it if you need the others' best values")

@@ -102,4 +102,6 @@ def test_gross_errors_do_not_make_frames_differ(surface: int) -> None:
 def test_every_repeat_is_named_once() -> None:
     looks = [a_look("a"), a_look("b", 1), shifted(a_look("c", 2), 30), a_look("d", 3)]
     said = redundancy_warnings(looks, CAMERA, 0.2)
-    assert [("a and b" in s, "a and d" in s) for s in said] == [(True, False), (False, True)]
+    (words,) = said
+    assert words.startswith("2 frames are nearly identical to earlier ones (b and d):")
+    assert redundancy_warnings(looks[:3], CAMERA, 0.2)[0].startswith("frames a and b are nearly")

@@ -98,3 +98,40 @@ def test_of_the_scale():
     assert "baselines" in free[-1]
     known = sentences(scale="known_distance", scale_std_percent=0.5)[0]
     assert known.startswith("Scale: lengths are in mm, from the known distance, known to 0.5 % ")
+
+
+def test_many_poses_are_said_together():
+    """Oracle: five frames: a sentence a device, with the largest deviation, and one for the
+    reason that two frames share; nothing is said five times."""
+    other = MEASURED.model_copy(update={"t": [-5.0, 1.0, 0.5]})
+    wide = MEASURED.model_copy(update={"std": [0.01] * 3 + [0.5] * 3})
+    frames = [frame("f0"), frame("f1", other, other), frame("f2", MEASURED, wide)]
+    frames += [
+        frame(
+            f"f{k}",
+            None,
+            MEASURED.model_copy(update={"status": "weak", "reason": f"relief {k}.0 mm"}),
+        )
+        for k in (3, 4)
+    ]
+    out = sentences(frames)
+    (poses,) = [line for line in out if line.startswith("Projector poses of 5 frames:")]
+    assert "at most 0.98)" in poses
+    assert "Projector poses of f3 and f4: only weakly determined; relief 3.0 mm." in out
+    assert sum("poses of" in line for line in out) == 3
+
+
+def test_warnings_of_frames_are_grouped():
+    """Oracle: two matters, three frames; a single frame keeps its sentence."""
+    from mitsuba_endo.solve.reporting.grouping import grouped
+
+    left = [
+        ("a.exr", "holds 12 correspondences"), ("b.exr", "its lens folds"),
+        ("c.exr", "holds 9 correspondences"),
+    ]  # fmt: skip
+    assert grouped(
+        left, "frame {names} was left out", "{count} frames were left out ({names})"
+    ) == [
+        "2 frames were left out (a.exr and c.exr): a.exr: holds 12 correspondences",
+        "frame b.exr was left out: its lens folds",
+    ]

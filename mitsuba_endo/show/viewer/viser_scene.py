@@ -112,7 +112,9 @@ class ViserScene:
             lines = pyramid(pose, corners, self.scene.reach)
             self.nodes.put_lines(f"{prefix}/{kind}", lines, colour or own)
             if colour is None:
-                self._label(f"{prefix}/{kind}_name", kind, pose)
+                several = len(self.scene.poses) > 1
+                words = f"{kind}, {at.name}" if several else kind
+                self._label(f"{prefix}/{kind}_name", words, pose)
 
     def _label(self, name: str, text: str, pose: RigidTransform) -> None:
         below = pose.apply(np.array([0.0, 0.02, -0.02]) * self.scene.distance)

@@ -1,6 +1,6 @@
 """The initial poses of all frames: each alone, or one projector pose for all."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ...records.solution import LeftOut
 from ...sanity.handedness import handedness
 from ..options import Options
 from ..unknowns.layout import Layout
+
+OnFrame = Callable[[int, int], None]
+"""Called with the number of a frame, from 1, and how many there are."""
 
 
 def start_frame(
@@ -64,6 +67,7 @@ def usable_starts(
     law: str,
     options: Options,
     known: Mapping[str, Start],
+    on_frame: OnFrame | None = None,
 ) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
     """Start every frame; frames without a start are left out by name.
 
@@ -75,13 +79,16 @@ def usable_starts(
         law: the projection model.
         options: how to solve.
         known: starts of some frames, by name, that need not be searched for again.
+        on_frame: called with the number of each, from 1, and how many there are.
 
     Raises:
         InputError: no frame has a start.
     """
     kept, starts, left_out = [], [], []
     failure: InputError | None = None
-    for map_ in maps:
+    for k, map_ in enumerate(maps, 1):
+        if on_frame is not None:
+            on_frame(k, len(maps))
         try:
             start = known.get(map_.name)
             starts.append(start or start_frame(map_, camera, rig, layout, law, options))

@@ -18,6 +18,7 @@ from ..minimisers.smoothing import smooth_surfaces
 from ..options import Options
 from ..surfaces.inverse_range_lattice import Lattice
 from ..unknowns.layout import Layout
+from .initial_poses import OnFrame
 from .restart import with_restarts
 from .separate_surfaces import separate_surfaces
 
@@ -30,8 +31,11 @@ def solve_alone(
     layout: Layout,
     law: str,
     options: Options,
+    on_frame: OnFrame | None = None,
 ) -> list[FrameSolution]:
     """Optimise every frame alone, with the blocks that the layout frees.
+
+    ``on_frame`` is called with the number of each, from 1, and how many there are.
 
     Raises:
         KeyboardInterrupt: the user stopped: there is nothing yet to go on from.
@@ -44,7 +48,9 @@ def solve_alone(
         )
 
     out = []
-    for map_, start in zip(maps, starts, strict=True):
+    for k, (map_, start) in enumerate(zip(maps, starts, strict=True), 1):
+        if on_frame is not None:
+            on_frame(k, len(maps))
         result = with_restarts([map_], [start], camera, lambda s, m=map_: solve(m, s[0]))
         if result.outcome is Outcome.INTERRUPTED:
             raise KeyboardInterrupt

@@ -96,6 +96,33 @@ def consistencies(alone: list[FrameSolution], result: OptimisationResult) -> lis
     return [_consistency(a, result, k, total - own[k]) for k, a in enumerate(alone)]
 
 
+def doubtful_frames(found: list[Consistency]) -> list[str]:
+    """Return warnings of the frames that fit badly, each with what to do.
+
+    Where most frames fit the common surface worse than alone, none of them is the wrong one: alone
+    a frame's surface takes up what its decoder's errors have in common, or the surface moved.
+    """
+    doubtful = [a for a in found if a.doubtful]
+    ratios = [a.ratio for a in doubtful if a.ratio > _DOUBTFUL]
+    if len(found) > 2 and len(ratios) > len(found) / 2:
+        return [
+            f"{len(ratios)} of {len(found)} frames fit the common surface {min(ratios):.2g} to "
+            f"{max(ratios):.2g} times worse than each a surface of its own, as maps do whose "
+            "errors are alike over many pixels, or surfaces that moved; if yours may have "
+            "moved, compare with --share surface=per_frame"
+        ]
+    return [_doubt(a, first=a is found[0], several=len(found) > 2) for a in doubtful]
+
+
+def _doubt(frame: Consistency, *, first: bool, several: bool) -> str:
+    said = f"do not rely on frame {frame.name}: {frame.reason}"
+    if not several:
+        return f"{said}; capture a third frame to tell which of the two is wrong"
+    if first:
+        return f"{said}; the other poses are told from its camera, so calibrate without it"
+    return f"{said}; calibrate without it if you need the others' best values"
+
+
 def worst(found: list[Consistency]) -> int | None:
     """Return the index of the most clearly wrong frame, or None."""
     wrong = [k for k, a in enumerate(found) if a.wrong]

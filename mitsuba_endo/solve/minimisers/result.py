@@ -1,7 +1,7 @@
 """Where a minimiser ended."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,8 @@ from ..unknowns.state import State
 
 USED_WEIGHT = 0.1
 """Robust weight above which a correspondence counts as used."""
+_QUANTILES = 256
+"""Chosen: the cost made of them is then right to a percent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,4 +73,30 @@ def trace_row(
         damping=damping,
         scale_px=noise.scale,
         step=size,
+        lengths=_quantiles(at),
     )
+
+
+def _quantiles(at: Evaluation) -> tuple[float, ...]:
+    """Return quantiles of the residuals' lengths; those of missed correspondences are infinite."""
+    squared = np.concatenate([frame.squared for frame in at.frames])
+    ordered = np.sort(np.where(np.isfinite(squared), squared, np.inf))
+    places = ((np.arange(_QUANTILES) + 0.5) / _QUANTILES * len(ordered)).astype(int)
+    return tuple(np.sqrt(ordered[places]).tolist()) if len(ordered) else ()
+
+
+def with_fixed_cost(trace: list[TraceRow], noise: NoiseScale) -> list[TraceRow]:
+    """Return a trace whose rows are judged by one loss, that of the end.
+
+    The loss that an iteration minimises follows the residuals, so its values cannot be compared
+    with one another; under one loss they fall.
+    """
+    return [replace(row, fixed_cost=_cost_of(row.lengths, noise), lengths=()) for row in trace]
+
+
+def _cost_of(lengths: tuple[float, ...], noise: NoiseScale) -> float | None:
+    if not lengths:
+        return None
+    far = 1e6 * noise.scale  # a residual that is missed costs what the loss has at most
+    squared = np.minimum(np.array(lengths), far) ** 2
+    return float(np.mean(noise.loss(squared, noise.scale)) / noise.sigma**2)

@@ -19,7 +19,7 @@ from ..inference.fit import Fit
 from ..inference.observability import correlation, describe
 from ..inference.period_errors import count_period_errors
 from ..minimisers.render_result import Rendering, render_frames
-from ..minimisers.result import USED_WEIGHT
+from ..minimisers.result import USED_WEIGHT, with_fixed_cost
 from ..options import Options
 from ..unknowns.block import BLOCKS, VectorBlock
 from .estimates import Estimates, inflation
@@ -85,7 +85,8 @@ def assemble(
     )
     solution = solution.model_copy(update={"verdict": verdict(solution)})
     return Calibration(
-        solution, refined, surfaces[0], frame_maps(fit, renderings), fit.result.trace,
+        solution, refined, surfaces[0], frame_maps(fit, renderings),
+        with_fixed_cost(fit.result.trace, fit.result.noise),
         checkpoint_of(fit.result), dict(enumerate(surfaces[1:], 1)),
         scaled(fit.history, unit.factor),
     )  # fmt: skip

@@ -33,6 +33,8 @@ UNSETTLED = "the optimisation had not converged"
 """Why a value with a small standard deviation is weak."""
 STRUCTURED = "the residuals hold structure that the model does not explain, see Model"
 """Why one that the relief would determine is weak."""
+_LISTED = 4
+"""Items that a sentence lists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +225,9 @@ def _deviations(covariance: Floats) -> list[float]:
 
 
 def listed(items: Sequence[str]) -> str:
-    """Return items as people list them."""
+    """Return items as people list them; of many the first ones and how many more there are."""
+    if len(items) > _LISTED + 1:
+        items = [*items[:_LISTED], f"{len(items) - _LISTED} more"]
     return " and ".join([", ".join(items[:-1]), items[-1]] if len(items) > 1 else items)
 
 

@@ -11,6 +11,7 @@ from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
 from ...initialisation.outlier_rejection import median_filter
 from ...records.correspondence import CorrespondenceMap
+from .estimates import listed
 
 _SMALL_SHARE = 0.02
 """Change below which two frames are alike: of the image, relative to its width, and of the
@@ -94,4 +95,10 @@ def redundancy_warnings(
                 f"frames {names[0]} and {names[1]} are nearly identical: together they hold no "
                 "more information than one, apart from averaged noise; move between captures"
             )
+    if len(out) > 1:
+        return [
+            f"{len(out)} frames are nearly identical to earlier ones ({listed(list(out))}): "
+            "together such frames hold no more information than one, apart from averaged noise; "
+            "move between captures"
+        ]
     return list(out.values())

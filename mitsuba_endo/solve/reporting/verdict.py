@@ -4,6 +4,11 @@ import numpy as np
 
 from ...records.solution import INTERVAL, Alternative, Estimate, PoseEstimate, Solution
 from ..unknowns.block import BLOCKS
+from .estimates import listed
+from .grouping import alike
+
+_FEW = 3
+"""Frames up to which every pose has a sentence of its own."""
 
 
 def verdict(solution: Solution) -> list[str]:
@@ -13,7 +18,9 @@ def verdict(solution: Solution) -> list[str]:
     out += _projection_model(solution) + _intrinsics(solution)
     first = solution.frames[0].projector_from_camera
     several = any(f.projector_from_camera != first for f in solution.frames)
-    for frame in solution.frames:
+    if len(solution.frames) > _FEW:
+        out += _all_poses(solution, several, unit)
+    for frame in solution.frames if len(solution.frames) <= _FEW else []:
         where = f" of {frame.name}" if len(solution.frames) > 1 else ""
         if several or frame is solution.frames[0]:
             named = f"Projector pose{where if several else ''}"
@@ -23,6 +30,33 @@ def verdict(solution: Solution) -> list[str]:
     if "conclusion" in solution.model:
         out.append(f"Model: {solution.model['conclusion']}.")
     return out + [_alternative(solution, a) for a in solution.alternatives]
+
+
+def _all_poses(solution: Solution, several: bool, unit: str) -> list[str]:
+    """Return a sentence for the poses of each device, and one for each reason to be wary."""
+    projectors = [(f.name, f.projector_from_camera) for f in solution.frames]
+    cameras = [(f.name, f.world_from_camera) for f in solution.frames]
+    out = [] if several else _pose("Projector pose", projectors[0][1], unit)
+    for device, poses in (("Projector", projectors if several else []), ("Camera", cameras)):
+        poses = [(name, pose) for name, pose in poses if pose.status != "fixed"]
+        known = [pose.std for _, pose in poses if pose.t is not None and pose.std is not None]
+        if known:
+            turned, moved = (INTERVAL * np.array([max(s[p]) for s in known])
+                             for p in (np.s_[:3], np.s_[3:]))  # fmt: skip
+            out.append(
+                f"{device} poses of {len(known)} frames: translations within ± "
+                f"{np.median(moved):.2g} {unit} (at most {moved.max():.2g}), rotations within ± "
+                f"{np.degrees(np.median(turned)):.2g} degrees (95 %); each is in frames.csv."
+            )
+        wary = {}
+        for name, pose in poses:
+            if pose.status in ("weak", "unobservable"):
+                wary.setdefault((pose.status, alike(pose.reason or "")), []).append((name, pose))
+        for (status, _), found in wary.items():
+            how = "only weakly determined" if status == "weak" else "not determined"
+            names = listed([name for name, _ in found])
+            out.append(f"{device} poses of {names}: {how}; {found[0][1].reason}.")
+    return out
 
 
 def _alternative(solution: Solution, other: Alternative) -> str:

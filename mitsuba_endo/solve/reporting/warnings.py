@@ -6,6 +6,7 @@ from ...geometry.cameras import CameraModel
 from ...records.solution import Outcome
 from ..minimisers.render_result import Rendering
 from .estimates import Estimates, listed
+from .grouping import grouped
 from .model_section import model_warnings
 from .redundancy import FrameView, redundancy_warnings
 
@@ -36,7 +37,11 @@ def fit_warnings(
         *([estimates.unit.warning] if estimates.unit.warning else []),
         *_convergence(estimates),
         *model_warnings(fit),
-        *(f"frame {f.name} was left out: {f.reason}" for f in fit.left_out),
+        *grouped(
+            [(f.name, f.reason) for f in fit.left_out],
+            "frame {names} was left out",
+            "{count} frames were left out ({names}), e.g.",
+        ),
         *_separate_scales(estimates),
         *redundancy_warnings(views, camera, fit.uncertainty.sigma),
     ]
