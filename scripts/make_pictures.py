@@ -106,7 +106,7 @@ def _turning(result: Path, out: Path) -> None:
 
 
 def _report(result: Path, out: Path) -> None:
-    """Show the top of the report with its truth, and below it the rig in space."""
+    """Show the top of the report: verdict, scene, photograph and maps."""
     calibration = read_solution_folder(result)
     with tempfile.TemporaryDirectory() as folder, browser(WIDTH, 700) as page:
         path = Path(folder) / "report.html"
@@ -114,15 +114,12 @@ def _report(result: Path, out: Path) -> None:
         save_report(path, [(result.name, calibration)], truths=truths)
         page.open(path.as_uri())
         time.sleep(1)
-        parts = []
-        for first, last, above in (("h1", ".viewer", 20), (".space", ".space", 60)):
-            top, bottom = page.evaluate(
-                f"[document.querySelector('{first}').getBoundingClientRect().top - {above}, "
-                f"document.querySelector('{last}').getBoundingClientRect().bottom + 20]"
-            )
-            page.screenshot(Path(folder) / "part.png", (top, bottom))
-            parts.append(cv2.imread(str(Path(folder) / "part.png")))
-    picture = np.concatenate(parts)
+        bottom = page.evaluate(
+            "document.querySelector('.viewer').getBoundingClientRect().bottom + 20"
+        )
+        page.screenshot(Path(folder) / "part.png", (0, bottom))
+        picture = cv2.imread(str(Path(folder) / "part.png"))
+        assert picture is not None
     smaller = cv2.resize(picture, None, fx=0.8, fy=0.8, interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(out / "report.png"), smaller, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 

@@ -1,5 +1,6 @@
 """Small input files for the tests of the commands."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ from typer.testing import CliRunner
 from mitsuba_endo.cli.main import app
 
 WIDTH, HEIGHT = 24, 14
+PROGRESS = re.compile(r"^\[ *[0-9.]+ s\] .*\n", re.M)
+"""A line of a command's progress, as it stands in a log."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +26,10 @@ class Result:
 
 
 def run(*arguments: object) -> Result:
-    """Run ``mitsuba-endo`` in this process."""
+    """Run ``mitsuba-endo`` in this process; lines of progress, which a slow machine adds, are left
+    out of stderr."""
     result = CliRunner().invoke(app, [str(a) for a in arguments])
-    return Result(result.exit_code, result.stdout, result.stderr)
+    return Result(result.exit_code, result.stdout, PROGRESS.sub("", result.stderr))
 
 
 def rig() -> dict[str, Any]:

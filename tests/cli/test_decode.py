@@ -13,6 +13,7 @@ from mitsuba_endo.decoding.grid_pattern import CodedGrid
 from mitsuba_endo.records.correspondence import load_map
 from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import Camera
+from mitsuba_endo.show.grid_picture import LEGEND
 from tests.cli.inputs import run
 from tests.decoding.grid_views import CAMERA, HEIGHT, SIZE, WIDTH, photo, view
 
@@ -68,7 +69,9 @@ def test_a_map_with_confidence_and_picture(llvm, rig: Path):
     np.testing.assert_array_equal(confidence > 0, decoded)
     picture = cv2.imread(str(maps / "frame_graph.png"))
     assert picture is not None
-    assert picture.shape[1] / picture.shape[0] == pytest.approx(WIDTH / HEIGHT)
+    shown = picture.shape[0] - LEGEND
+    assert picture.shape[1] / shown == pytest.approx(WIDTH / HEIGHT)
+    assert len(np.unique(picture[shown:].reshape(-1, 3), axis=0)) > 5  # lines in colours, words
 
 
 def test_one_line_a_frame(llvm, rig: Path):
