@@ -21,6 +21,27 @@ median (lowest to highest) over seeds that were not used to choose any setting.
 """
 
 
+FOUND = {
+    ("polyp", "median error (%)"): (
+        "The diameter of a polyp, measured on one frame, is off by {:.2g} % in the median."
+    ),
+    ("polyp", "95 % interval covers (%)"): (
+        "Its stated 95 % interval holds the truth in {:.3g} % of the draws."
+    ),
+    ("per_frame", "RMSE of ours / A, median"): (
+        "Frames solved together leave {:.2g} times the surface error of the same frames solved "
+        "alone, with a projector pose for each, and merged by ICP and TSDF (target: 0.4)."
+    ),
+    ("per_frame", "RMSE of ours / B, median"): (
+        "They leave {:.2g} times that of frames with one projector pose for all (target: 0.5)."
+    ),
+    ("focal", "direction_cosine: estimated, 4 frames / fixed, 1 frame"): (
+        "A focal length estimated from four frames leaves {:.2g} times the error of one that is "
+        "given wrong."
+    ),
+}  # fmt: skip
+"""Sentences for figures, by experiment and name of the figure."""
+
 COMPARED = {
     "peers": (
         ("law",),
@@ -54,12 +75,23 @@ def write_results(page: Path, done: dict[str, tuple[str, Path]]) -> None:
             shutil.copyfile(picture, images / f"results_{picture.name}")
             parts.append(f"![{picture.stem}](images/results_{picture.name})\n")
         targets += _targets(name, out)
-    head = "## Targets\n\n" + markdown(targets) + "\n" if targets else ""
+    foot = "## Targets\n\n" + markdown(targets) + "\n" if targets else ""
     worse = _better_peers(done)
     if worse:
-        head += f"## Where a peer does better\n\nBy more than 5 %.\n\n{markdown(worse)}\n"
+        foot += f"## Where a peer does better\n\nBy more than 5 %.\n\n{markdown(worse)}\n"
+    text = INTRO + found(targets) + "\n".join(parts) + ("\n" + foot if foot else "")
     with atomic_path(page) as aside:
-        aside.write_text(INTRO + head + "\n".join(parts), encoding="utf-8")
+        aside.write_text(text.rstrip("\n") + "\n", encoding="utf-8")
+
+
+def found(targets: list[Row]) -> str:
+    """Say in sentences what the figures with a target mean, as far as they were computed."""
+    values = {(str(row["experiment"]), str(row["figure"])): float(row["value"]) for row in targets}
+    said = [f"- {words.format(values[key])}\n" for key, words in FOUND.items() if key in values]
+    if not said:
+        return ""
+    pointer = "Targets, also those missed, and where peers do better, are at [the end](#targets).\n"
+    return "## What was found\n\n" + "".join(said) + f"\n{pointer}\n"
 
 
 def _better_peers(done: dict[str, tuple[str, Path]]) -> list[Row]:

@@ -10,7 +10,7 @@ from reproduce.decoder_noise import (  # pyright: ignore[reportMissingImports]
     Plain,
     beside_steps,
 )
-from reproduce.results import write_results  # pyright: ignore[reportMissingImports]
+from reproduce.results import found, write_results  # pyright: ignore[reportMissingImports]
 from reproduce.scenes import PROJECTOR, SIZE  # pyright: ignore[reportMissingImports]
 from reproduce.tables import (  # pyright: ignore[reportMissingImports]
     save_table,
@@ -133,6 +133,11 @@ def test_the_page_holds_tables_pictures_and_missed_targets(tmp_path: Path) -> No
     write_results(tmp_path / "docs" / "results.md", {"focal": ("Title.\n\nWhat it is.", out)})
     page = (tmp_path / "docs" / "results.md").read_text()
     assert "## Title\n\nWhat it is." in page
+    assert page.index("## Title") < page.index("## Targets")
+    row = {"experiment": "polyp", "figure": "median error (%)", "value": 1.437}
+    words = found([row])
+    assert "measured on one frame, is off by 1.4 % in the median." in words
+    assert found([{**row, "figure": "another"}]) == ""
     assert "| focal | ratio | 0.5 | at most 0.4 | **no** |" in page
     assert "| focal | share | 0.9 | at least 0.8 | yes |" in page
     assert (tmp_path / "docs" / "images" / "results_focal.png").read_bytes() == b"picture"
