@@ -20,6 +20,8 @@ STD_PROPERTY = "std_0"
 MODES = "surface_modes.npz"
 """The surfaces' modes, by the names of the surfaces' files; beside them."""
 SURFACE = "surface.ply"
+_LARGEST = 65_504.0
+"""Of half precision; a mode beyond is of a direction that nothing determines."""
 
 
 def own_surface_name(frame: int) -> str:
@@ -61,7 +63,7 @@ def save_modes(path: str | Path, surfaces: dict[str, SurfaceEstimate]) -> None:
         InputError: the file cannot be written.
     """
     arrays: dict[str, Any] = {
-        name: surface.modes.astype(np.float16)
+        name: np.clip(surface.modes, -_LARGEST, _LARGEST).astype(np.float16)
         for name, surface in surfaces.items()
         if surface.modes is not None
     }

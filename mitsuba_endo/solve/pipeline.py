@@ -27,7 +27,7 @@ from .frames.single_frames import solve_alone
 from .history import History
 from .inference.covariance import uncertainty
 from .inference.fit import Fit, FrameSolution
-from .inference.frame_consistency import consistencies, doubtful_frames, worst
+from .inference.frame_consistency import consistencies, doubtful_frames, plan_refuted, worst
 from .inference.model_error.analysis import check_model
 from .inference.observability import Direction
 from .inference.predicted_observability import predicted_directions
@@ -196,17 +196,18 @@ def _optimise_joint(
 ) -> Optimised:
     """Optimise all frames; leave out one that contradicts the others and try again."""
     left_out: list[LeftOut] = []
-    while True:
+    while True:  # but not for long: each frame left out costs a solution
         problem, state = _joint_problem(job, alone, seen_from_first(registered))
         result, predicted = _optimise(job, problem, state, _reporter(job, say, 0.6))
         judged = consistencies(alone, result) if len(alone) > 1 else []
         wrong = None if result.outcome is Outcome.INTERRUPTED else worst(judged)
-        if wrong is None:
+        refuted = plan_refuted(judged, problem.layout, len(left_out))
+        if wrong is None or refuted:
             break
         left_out.append(LeftOut(name=alone[wrong].name, reason=judged[wrong].reason))
         alone = [a for k, a in enumerate(alone) if k != wrong]
         registered = [p for k, p in enumerate(registered) if k != wrong]
-    doubts = doubtful_frames(judged)
+    doubts = [refuted] if wrong is not None and refuted else doubtful_frames(judged)
     names = {a.name for a in alone}
     maps = [m for m in job.maps if m.name in names]
     return Optimised(maps, left_out, doubts, result, predicted)

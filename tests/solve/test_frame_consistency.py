@@ -1,7 +1,7 @@
 """The limits of consistency. Oracle: tables, formulas; whole solves are in ``test_bad_frames``."""
 
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -116,3 +116,34 @@ def test_frames_that_all_fit_alike_are_not_each_accused():
     assert said.endswith("the other poses are told from its camera, so calibrate without it")
     (said,) = doubtful_frames([one[1], one[0], one[2]])
     assert said.endswith("calibrate without it if you need the others' best values")
+
+
+class _Plan:
+    """A layout, as far as it says how projector poses are shared."""
+
+    def __init__(self, mode: str) -> None:
+        self.mode = mode
+
+    def sharing(self, name: str) -> str:
+        assert name == "projector_pose"
+        return self.mode
+
+
+def test_a_plan_that_most_frames_contradict_is_accused_at_once():
+    """Oracle: by hand: 11 of 20 frames contradict; of 5 one does, and is left out; after a tenth
+    was left out the next one accuses the plan; a plan that ties nothing is never accused."""
+    from mitsuba_endo.solve.inference.frame_consistency import Consistency, plan_refuted
+
+    def judged(wrong: int, right: int) -> list[Consistency]:
+        ratios = [4.0] * wrong + [1.0] * right
+        return [Consistency(f"f{k}", 0.9, ratio, 0.0) for k, ratio in enumerate(ratios)]
+
+    shared: Any = _Plan("shared")
+    said = plan_refuted(judged(11, 9), shared, 0)
+    assert said.startswith("the plan is wrong: with one projector pose for all, 11 of 20 frames")
+    assert "--share projector_pose=per_frame" in said
+    assert plan_refuted(judged(1, 4), shared, 0) == ""
+    assert plan_refuted(judged(1, 17), shared, 1) == ""
+    assert plan_refuted(judged(1, 17), shared, 2).startswith("the plan is wrong")
+    own: Any = _Plan("per_frame")
+    assert plan_refuted(judged(20, 0), own, 5) == ""

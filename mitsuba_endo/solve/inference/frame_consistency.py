@@ -35,6 +35,11 @@ knows worse depends on noise that passes for relief."""
 _MORE_OUTLIERS = 0.35
 """Rise of the share of outliers that a right place does not cause; folds cause up to 0.2."""
 
+_ENOUGH = 4
+"""Frames from which most of them can accuse the plan: of fewer one wrong frame may be half."""
+_MOST_LEFT_OUT = 0.1
+"""Share of the frames after which those that still contradict accuse the plan instead."""
+
 
 @dataclass(frozen=True)
 class Consistency:
@@ -121,6 +126,31 @@ def _doubt(frame: Consistency, *, first: bool, several: bool) -> str:
     if first:
         return f"{said}; the other poses are told from its camera, so calibrate without it"
     return f"{said}; calibrate without it if you need the others' best values"
+
+
+def plan_refuted(found: list[Consistency], layout: Layout, left_out: int) -> str:
+    """Say that the sharing plan is wrong where most frames contradict it, else nothing.
+
+    One frame that does not belong to the others is left out and the rest solved again; where the
+    plan ties what moved, that would go on to the last frame, a joint solution each time.
+
+    Args:
+        found: agreement of every frame with the joint solution.
+        layout: with the plan.
+        left_out: frames that were left out before.
+    """
+    count = len(found) + left_out
+    contradicting = [a for a in found if a.wrong and not a.stray]
+    tied = layout.sharing("projector_pose") != "per_frame"
+    many = len(contradicting) > len(found) / 2 or left_out >= count * _MOST_LEFT_OUT
+    if not (tied and contradicting and count >= _ENOUGH and many):
+        return ""
+    ratio = np.median([a.ratio for a in contradicting])
+    return (
+        f"the plan is wrong: with one projector pose for all, {left_out + len(contradicting)} of "
+        f"{count} frames contradict the others (residuals {ratio:.2g} times those alone); do not "
+        "trust the values, and calibrate with --share projector_pose=per_frame"
+    )
 
 
 def worst(found: list[Consistency]) -> int | None:
