@@ -6,9 +6,8 @@ from ..errors import InputError
 from ..evaluate.sequence_errors import TrackedFrames
 from ..reading.regular import is_file
 from ..records.solution import load_solution
-from ..records.surface import load_surface
+from ..records.surface import SURFACE, load_surface
 from ..records.trajectory import load_frames
-from .map_names import SURFACE
 from .trajectory_files import FRAMES
 
 KEYFRAMES = "keyframes"
