@@ -86,7 +86,11 @@ def write_results(page: Path, done: dict[str, tuple[str, Path]]) -> None:
 
 def found(targets: list[Row]) -> str:
     """Say in sentences what the figures with a target mean, as far as they were computed."""
-    values = {(str(row["experiment"]), str(row["figure"])): float(row["value"]) for row in targets}
+    values = {
+        (str(row["experiment"]), str(row["figure"])): float(row["value"])
+        for row in targets
+        if row["value"] is not None
+    }
     said = [f"- {words.format(values[key])}\n" for key, words in FOUND.items() if key in values]
     if not said:
         return ""
