@@ -151,8 +151,9 @@ def _track(
         run = past and past.go_on(rig, options, on_frame)
         keepers = Keepers([keeper, *watching])
         recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keepers)
-        say("Writing the folder")
+        say("Adjusting all frames together")
         result = outcome_of(recorded, options.vertices)
+        say("Writing the folder")
         write_sequence_folder(out, result, keeper.copy_state, kinds)
         keeper.remove()
     return result

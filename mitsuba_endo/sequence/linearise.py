@@ -168,3 +168,50 @@ def against_map(
         known, at.distance / np.where(known, length, 1.0), cosine,
         np.concatenate([cosine * found.range_by_pose, own]),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class CoordinatesAt:
+    """Where points on the camera's rays appear in the pattern."""
+
+    good: Bools
+    """(N,) before the projector."""
+    q: Floats
+    """(2, N) pattern pixels."""
+    slope: Floats
+    """(N,) how far the coordinate moves with the range."""
+    tangent: Floats
+    """(2, N) unit, in which direction."""
+    gradient: Floats
+    """(2, 3, N) of coordinates by points of the projector's frame."""
+    turned: Floats
+    """(3, N) points in the projector's axes, from the camera's centre."""
+    centre: Floats
+    """(2, 1) of the projection."""
+
+    @property
+    def normal(self) -> Floats:
+        """(2, N) unit, across the tangent."""
+        return np.stack([-self.tangent[1], self.tangent[0]])
+
+    def by_pose(self, direction: Floats) -> Floats:
+        """Return the derivative (6, N) along directions (2, N) by the projector's pose."""
+        return _by_pose(self.gradient, direction, self.turned)
+
+    def by_focal(self, direction: Floats) -> Floats:
+        """Return the derivative (1, N) along directions (2, N) by the log of the focal length."""
+        return dot2(direction, self.q - self.centre)[None]
+
+
+def coordinates_at(
+    projector: ProjectorModel, pose: RigidTransform, rays: Floats, range_: Floats
+) -> CoordinatesAt:
+    """Project points at ranges (N,) along rays (3, N), the projector at projector_from_camera."""
+    along = pose.R @ rays
+    turned = along * range_
+    Y = turned + pose.t[:, None]
+    good = Y[2] > 0
+    q, gradient = _projection(projector, np.where(good, Y, np.array([[0.0], [0.0], [1.0]])))
+    slope, tangent = _along(gradient, along)
+    centre = np.array(projector.centre, float)[:, None]
+    return CoordinatesAt(good, q, slope, tangent, gradient, turned, centre)

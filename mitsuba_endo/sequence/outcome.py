@@ -15,7 +15,9 @@ from ..records.solution import Estimate, Frame, LeftOut, Outcome, PoseEstimate, 
 from ..records.trajectory import FrameRow
 from ..robust import robust_std
 from ..solve.reporting.assemble import versions
+from .adjustment.finish import FinishedPart, with_deviations
 from .bootstrap import Beginning
+from .finish import Finished, finish
 from .frames import PicturedMap
 from .run import Recorded
 from .verdict import focal_warning, told
@@ -66,18 +68,26 @@ def outcome_of(recorded: Recorded, vertices: int | None = 100_000) -> SequenceRe
     beginning = recorded.beginning
     if beginning is None:
         raise ValueError("nothing was recorded before the first frames were calibrated")
-    placed = [row.part for row in recorded.rows if not row.lost]
-    main = int(np.bincount(placed).argmax())
-    surfaces = [_surface(part.volume, vertices) for part in recorded.parts]
-    solution = _solution(recorded, beginning, main)
-    surface = surfaces[main]
+    finished = finish(recorded)
+    surfaces = [
+        _surface(part, tracked.volume, vertices)
+        for part, tracked in zip(finished.parts, finished.joined, strict=True)
+    ]
+    solution = _solution(recorded, beginning, finished)
+    surface = surfaces[finished.main]
     keyframes = None
     if surface is not None:
-        maps = dict(recorded.kept[main].kept)
-        keyframes = _calibration(solution, recorded, surface, maps)
+        maps = dict(finished.joined[finished.main].maps)
+        keyframes = _calibration(solution, finished.rows, recorded.rig, surface, maps)
         solution = keyframes.solution
     return SequenceResult(
-        recorded.rig, recorded.rows, surfaces, main, solution, keyframes, _pictures(recorded)
+        recorded.rig,
+        finished.rows,
+        surfaces,
+        finished.main,
+        solution,
+        keyframes,
+        _pictures(recorded),
     )
 
 
@@ -87,18 +97,19 @@ def _pictures(recorded: Recorded) -> dict[int, NDArray[np.uint8]]:
     return {k: picture for k, picture in pictured.items() if picture is not None}
 
 
-def _surface(volume: Volume, vertices: int | None) -> FusedMesh | None:
+def _surface(part: FinishedPart | None, tracked: Volume, vertices: int | None) -> FusedMesh | None:
     try:
-        return surface_of(volume, vertices=vertices)
+        mesh = surface_of(tracked if part is None else part.volume, vertices=vertices)
     except ValueError:  # no two pixels beside each other
         return None
+    return mesh if part is None else with_deviations(mesh, part.adjusted)
 
 
-def _solution(recorded: Recorded, beginning: Beginning, main: int) -> Solution:
-    alone, rows = beginning.solution, recorded.rows
-    shown = {number for number, _ in recorded.kept[main].kept}
+def _solution(recorded: Recorded, beginning: Beginning, finished: Finished) -> Solution:
+    alone, rows = beginning.solution, finished.rows
+    shown = {number for number, _ in finished.joined[finished.main].maps}
     lost = [LeftOut(name=row.name, reason=row.lost) for row in rows if row.lost]
-    projector = alone.projector.model_copy(update={"focal": _focal(beginning)})
+    projector = alone.projector.model_copy(update={"focal": _focal(beginning, finished)})
     noise = [row.noise_px for row in rows if row.noise_px is not None]
     return alone.model_copy(update={
         "outcome": Outcome.INTERRUPTED if recorded.interrupted else Outcome.CONVERGED,
@@ -107,7 +118,7 @@ def _solution(recorded: Recorded, beginning: Beginning, main: int) -> Solution:
         "frames": [_frame(row) for row in rows if row.number in shown],
         "left_out": lost,
         "alternatives": [],
-        "verdict": told(rows, len(recorded.parts), projector.focal),
+        "verdict": told(rows, [p is not None for p in finished.parts], projector.focal),
         "warnings": focal_warning(beginning.told, recorded.told),
         "noise_px": float(np.median(noise)) if noise else alone.noise_px,
         "model": {},
@@ -118,11 +129,12 @@ def _solution(recorded: Recorded, beginning: Beginning, main: int) -> Solution:
     })  # fmt: skip
 
 
-def _focal(beginning: Beginning) -> Estimate:
-    alone, value = beginning.solution.projector.focal, float(beginning.setup.projector.focal)
+def _focal(beginning: Beginning, finished: Finished) -> Estimate:
+    alone, value = beginning.solution.projector.focal, float(finished.projector.focal)
     if alone.status == "fixed":
         return alone
-    std = value * beginning.told.std
+    main = finished.parts[finished.main]
+    std = value * (beginning.told.std if main is None else main.adjusted.covariance.focal_std)
     if not np.isfinite(std):
         return alone.model_copy(update={"value": value})
     return Estimate(value=value, std=std, std_jackknife=std, status="measured")
@@ -145,18 +157,19 @@ def _pose(pose: RigidTransform, std: NDArray[np.float64] | None) -> PoseEstimate
 
 
 def _calibration(
-    solution: Solution, recorded: Recorded, fused: FusedMesh, maps: dict[int, CorrespondenceMap]
-) -> Calibration:
+    solution: Solution, rows: list[FrameRow], rig: Rig, fused: FusedMesh,
+    maps: dict[int, CorrespondenceMap],
+) -> Calibration:  # fmt: skip
     """Render the keyframes from the surface, beside what was observed."""
     from ..rendering.synthetic import MeshScene
 
-    surface = SurfaceEstimate(fused.vertices, fused.faces)
-    camera, model = recorded.rig.camera.to_model(), solution.projector.to_model()
+    surface = SurfaceEstimate(fused.vertices, fused.faces, fused.std)
+    camera, model = rig.camera.to_model(), solution.projector.to_model()
     assert model is not None
     scene = MeshScene(fused.vertices, fused.faces)
-    size = recorded.rig.projector.width, recorded.rig.projector.height
+    size = rig.projector.width, rig.projector.height
     shown: list[FrameMaps] = []
-    for row in (recorded.rows[number] for number in maps):
+    for row in (rows[number] for number in maps):
         assert row.world_from_camera is not None
         assert row.projector_from_camera is not None
         view = scene.view(camera, row.world_from_camera, model, row.projector_from_camera, size)

@@ -14,6 +14,7 @@ from ..initialisation.range_image import RangeImage
 from .bending import bending
 from .epipolar_focal import pose_directions
 from .gate import fault
+from .kept_views import KeptViews
 from .keyframes import Keyframes
 from .linearise import Poses, orthonormal
 from .map_drift import MapDrift, in_world
@@ -90,8 +91,10 @@ class Part:
         self._drift = MapDrift(self._known_alone(view, Prior(projector_pose, np.zeros((6, 6)))))
         self._searches = 0
         seen = ranged(view, self._last[1], setup.projector, noise)
+        self.views = KeptViews(view.camera)
         self._fuse(number, seen)
         self._keep(number, self._last[1], seen)
+        self.views.keep(number, view, self._last[1], noise, fused=True)
         self.first = Tracked(self._last[1], np.zeros((12, 12)), None, keyframe=True)
 
     def track(self, number: int, view: ThinnedMap) -> Tracked | str:
@@ -170,6 +173,7 @@ class Part:
                 self.keyframes.kept[0].pyramid.unit,
             )  # fmt: skip
             self._fuse(number, seen)
+        self.views.keep(number, view, poses, found.noise, fused=keyframe or due)
         consecutive = number == self._last[0] + 1
         self._before = self._last if consecutive else None
         self._last, self.noise, self._searches = (number, poses), found.noise, 0

@@ -173,12 +173,12 @@ def _curvature(found: Triangulated, seen: AgainstMap, noise: float, voxel: float
     (across, on_line, r), (along, _, d) = _rows(found, seen, noise, voxel, 1.0)
     known = seen.known & found.good
     A = np.zeros((12, 12))
-    A[:6, :6] = _mean_curvature(r[found.good]) * (across * found.good) @ across.T
-    A += _mean_curvature(d[known]) * (along * (on_line * known)) @ along.T
+    A[:6, :6] = mean_curvature(r[found.good]) * (across * found.good) @ across.T
+    A += mean_curvature(d[known]) * (along * (on_line * known)) @ along.T
     return _held(A)
 
 
-def _mean_curvature(residual: Floats) -> float:
+def mean_curvature(residual: Floats) -> float:
     """Return the mean second derivative of the loss, at least a tenth of least squares'."""
     if not len(residual):
         return 1.0

@@ -254,8 +254,9 @@ def run_sequence(
 ) -> Recorded:
     """Track all frames of a sequence.
 
-    Frames are taken one by one, and nothing of them is kept but their poses and what they add to
-    the map. Ctrl-C ends the sequence after the frames that were placed.
+    Frames are taken one by one, and what is kept of them are their poses, packed coordinates for
+    the adjustment, and what they add to the map. Ctrl-C ends the sequence after the frames that
+    were placed.
 
     Args:
         frames: correspondence maps in the order in which they were taken.

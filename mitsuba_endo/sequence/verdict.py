@@ -12,14 +12,15 @@ SHOWN = 5
 """Lost frames that are named; the table of frames has all."""
 
 
-def told(rows: Sequence[FrameRow], parts: int, focal: Estimate) -> list[str]:
-    """Return one sentence on tracking, one on parts if there are several, one on the focal length.
+def told(rows: Sequence[FrameRow], adjusted: Sequence[bool], focal: Estimate) -> list[str]:
+    """Return sentences on tracking, on parts if there are several, and on the focal length.
 
     Args:
         rows: all frames.
-        parts: of the map.
+        adjusted: of each part, whether its frames were adjusted together.
         focal: of the projector.
     """
+    parts = len(adjusted)
     lost = [row for row in rows if row.lost]
     sentences = [f"{len(rows) - len(lost)} of {len(rows)} frames were placed.{_named(lost)}"]
     if parts > 1:
@@ -29,8 +30,13 @@ def told(rows: Sequence[FrameRow], parts: int, focal: Estimate) -> list[str]:
         )
     if isinstance(focal.value, float) and isinstance(focal.std, float):
         sentences.append(
-            f"The focal length is {focal.value:.2f} +- {INTERVAL * focal.std:.2f} px, from the "
-            "first frames, and was held for the others."
+            f"The focal length is {focal.value:.2f} +- {INTERVAL * focal.std:.2f} px, the same in "
+            "all frames."
+        )
+    if not all(adjusted):
+        sentences.append(
+            f"{'Poses' if parts == 1 else 'Poses of some parts'} are as they were tracked: too few "
+            "frames show the same surface to adjust them together."
         )
     return sentences
 

@@ -37,9 +37,10 @@ def write_sequence_folder(
         kinds: of :data:`.sequence_views.KINDS`: files of every frame, in folders of these names.
 
     =========================  ====================================================================
-    mesh.ply                   the surface in the first camera's frame; ``frames_0`` says for each
-                               vertex how many fused frames measured it; where images were given,
-                               colours are those of the photographs of some keyframes
+    mesh.ply                   the surface in the first camera's frame; for each vertex ``std_0``,
+                               standard deviation along the normal, and ``frames_0``, how many
+                               fused frames measured it; where images were given, colours are
+                               those of the photographs of some keyframes
     trajectory_camera.tum      number of the frame, world_from_camera: t x y z qx qy qz qw
     trajectory_projector.tum   likewise world_from_projector
     frames.csv                 one line a frame: poses with deviations, fit, why it was lost
@@ -74,8 +75,8 @@ def write_sequence_folder(
 
 
 def save_mesh(path: str | Path, mesh: FusedMesh, colours: NDArray[np.uint8] | None = None) -> None:
-    """Write a fused mesh as PLY, with the number of frames and a colour for each vertex."""
+    """Write a fused mesh as PLY, with deviation, number of frames and a colour for each vertex."""
     save_surface(
-        path, SurfaceEstimate(mesh.vertices, mesh.faces),
+        path, SurfaceEstimate(mesh.vertices, mesh.faces, mesh.std),
         {"frames_0": mesh.frames.astype(np.float32)}, colours,
     )  # fmt: skip

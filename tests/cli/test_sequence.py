@@ -75,6 +75,8 @@ def test_files_tell_of_the_same_frames(folder: Path) -> None:
         assert 5 < np.linalg.norm(light.t - pose.t) < 6  # the baseline, mm
     mesh = load_surface(out / "mesh.ply")
     assert len(mesh.vertices) > 5000
+    assert mesh.std is not None
+    assert 0.01 < np.nanmedian(mesh.std) < 1.0  # mm
     assert b"property float frames_0" in (out / "mesh.ply").read_bytes()[:500]
     solution = load_solution(out)
     assert solution.surface == "mesh.ply"

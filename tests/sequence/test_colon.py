@@ -55,6 +55,19 @@ def test_surface_is_the_colons(result: SequenceResult, colon: Recording) -> None
     assert near.mean() > 0.9
 
 
+def test_vertices_err_by_their_deviations(result: SequenceResult, colon: Recording) -> None:
+    """Oracle: the scene, first cameras put together; 95 % intervals hold the truth in 80 to 100 %,
+    and stating twice the deviation would be too much."""
+    (surface,) = result.surfaces
+    assert surface is not None
+    error = distance_to_mesh(surface.vertices, colon.mesh.vertices, colon.mesh.faces)
+    known = np.isfinite(surface.std)
+    assert known.mean() > 0.95
+    off = error[known] / surface.std[known]
+    assert (off < 1.96).mean() > 0.8
+    assert (off < 1.0).mean() < 0.9
+
+
 def test_deviations_are_those_of_the_errors(result: SequenceResult, colon: Recording) -> None:
     """Errors of projector poses are some one to two deviations; of every one by white noise."""
     errors = []

@@ -79,6 +79,28 @@ def test_a_jump_begins_a_new_part(monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.main == 0
 
 
+def test_parts_that_meet_again_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Away and back: the third part saw what the first one did, the second one did not.
+
+    Oracle: the scene: poses of the third part in the first one's world.
+    """
+    monkeypatch.setattr(module, "LONG_LOSS", 1)
+    long = withdrawal(160)
+    numbers = [0, 1, 2, 3, 4, *range(150, 156), *range(2, 8)]
+    maps = [CorrespondenceMap(long.map(k).q, f"f{i}") for i, k in enumerate(numbers)]
+    found = run_sequence(maps, long.rig(), FEW)
+    assert len(found.parts) == 3
+    result = outcome_of(found)
+    assert len(result.surfaces) == 2
+    rows = [row for row in result.rows if not row.lost]
+    assert [row.part for row in rows] == [0] * 5 + [1] * 5 + [0] * 5
+    assert "2 parts" in result.solution.verdict[1]
+    for row in rows[10:]:
+        assert row.world_from_camera is not None
+        off = row.world_from_camera.t - long.world_from_camera[numbers[row.number]].t
+        assert np.linalg.norm(off) < 0.4
+
+
 def test_a_lost_frame_is_found_again_by_keyframes(colon: Recording) -> None:
     """The last frame looks again where the first did: motion does not lead there."""
     numbers = [*range(COUNT), 1]

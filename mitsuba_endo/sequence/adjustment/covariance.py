@@ -1,0 +1,122 @@
+"""Covariance of the adjusted poses: a sandwich, whatever errors the pixels of a block share.
+
+With H the cost's second derivatives and V the sum of s s^T over blocks of the frames' images, s
+being a block's share of the gradient after the elements were eliminated, it is H^-1 V H^-1 (White;
+Liang and Zeger, 1986, blocks as clusters). Residuals are smaller than the errors that made them, by
+what the elements take up, which is undone; what twelve unknowns a frame take of its blocks is not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..placement import mean_curvature
+from .equations import FRAME, Equations, Weights, columns_of
+from .observations import BLOCKS, Seen
+
+Floats = NDArray[np.float64]
+
+_LEAST_LEFT = 0.05
+"""Share of an error that is left in its residual, at least: what one frame alone tells of an
+element says nothing of errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Of all unknowns of an adjustment."""
+
+    matrix: Floats
+    """(12 K + 1, 12 K + 1) of the frames' steps, see :meth:`Poses.moved`, and the log of the focal
+    length."""
+
+    def of_frame(self, k: int) -> Floats:
+        """Return the block (12, 12) of a frame."""
+        at = slice(FRAME * k, FRAME * (k + 1))
+        return self.matrix[at, at]
+
+    @property
+    def focal_std(self) -> float:
+        """Of the log of the focal length."""
+        return float(np.sqrt(max(self.matrix[-1, -1], 0.0)))
+
+
+def curvature_weights(seen: Seen) -> Weights:
+    """Return weights that make the cost's second derivatives, in the mean over residuals."""
+    across = mean_curvature(seen.across)
+    along = mean_curvature(seen.along)
+    return Weights(np.full(len(seen.across), across), along * seen.on_line)
+
+
+def scatter(seen: Sequence[Seen], at: Equations, weights: Sequence[Weights]) -> Floats:
+    """Return V (n, n), see the module.
+
+    Args:
+        seen: by each frame, at the solution.
+        at: equations under the curvature's weights.
+        weights: these.
+    """
+    V = np.zeros_like(at.A)
+    for k, (s, w) in enumerate(zip(seen, weights, strict=True)):
+        columns, scores = _scores(k, s, w, at)
+        V[np.ix_(columns, columns)] += scores.T @ scores
+    return V
+
+
+def _scores(
+    k: int, seen: Seen, weights: Weights, at: Equations
+) -> tuple[NDArray[np.int64], Floats]:
+    """Return the unknowns (C,) on which a frame's gradient depends, and its blocks' shares
+    (blocks, C).
+    """
+    size, information = len(at.A), at.information[seen.element]
+    known = information > 0
+    share = weights.along * seen.by_element**2 / np.where(known, information, 1.0)
+    left = (seen.along - seen.by_element * at.mean[seen.element]) / np.sqrt(
+        np.maximum(1 - share, _LEAST_LEFT)
+    )
+    score = np.where(known, seen.weight * left, 0.0)
+    rows = seen.by_unknowns * score + seen.across_by_unknowns * (seen.on_line * seen.across)
+    count = BLOCKS[0] * BLOCKS[1]
+    own = np.stack([np.bincount(seen.block, row, count) for row in rows], axis=1).astype(float)
+    parts = [(columns_of(k, size), own)]
+    for response in at.responses:
+        first, end = np.searchsorted(
+            seen.element, [response.first, response.first + response.g.shape[1]]
+        )
+        if first == end:
+            continue
+        here = slice(first, end)
+        by_block = sp.csr_array(
+            (
+                (score * seen.by_element)[here],
+                (seen.block[here], seen.element[here] - response.first),
+            ),
+            shape=(count, response.g.shape[1]),
+        )
+        parts.append((response.columns, -(by_block @ response.g.T)))
+    return _summed(parts, size, count)
+
+
+def _summed(
+    parts: Sequence[tuple[NDArray[np.int64], Floats]], size: int, count: int
+) -> tuple[NDArray[np.int64], Floats]:
+    columns = np.unique(np.concatenate([c for c, _ in parts]))
+    place = np.zeros(size, np.int64)
+    place[columns] = np.arange(len(columns))
+    out = np.zeros((count, len(columns)))
+    for part, values in parts:
+        out[:, place[part]] += values  # a part has each column once
+    return columns, out
+
+
+def covariance(H: Floats, V: Floats, free: NDArray[np.bool_]) -> Covariance:
+    """Return H^-1 V H^-1 of the free unknowns, zero for the others."""
+    at = np.ix_(free, free)
+    inverse = scipy.linalg.cho_solve(scipy.linalg.cho_factor(H[at]), np.eye(int(free.sum())))
+    out = np.zeros_like(H)
+    out[at] = inverse @ V[at] @ inverse
+    return Covariance(out)
