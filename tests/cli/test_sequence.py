@@ -13,7 +13,8 @@ import pytest
 import yaml
 
 from mitsuba_endo.png import write_png
-from mitsuba_endo.records.correspondence import read_exr, write_map
+from mitsuba_endo.records.correspondence import write_map
+from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.solution import load_solution
 from mitsuba_endo.records.surface import load_surface
 from mitsuba_endo.records.trajectory import load_tum
