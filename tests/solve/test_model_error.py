@@ -7,14 +7,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.interpolate import LinearNDInterpolator
 from scipy.ndimage import gaussian_filter
 
 from mitsuba_endo.geometry.projection_models import projector_model
+from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Camera, Projector, Rig, Scale, Share
 from mitsuba_endo.records.solution import Solution
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
+from mitsuba_endo.solve.reporting import assemble as assemble_module
+from mitsuba_endo.solve.reporting.surface_result import surface_estimate
 
 from ..rigs import bumpy_sheet, cast, lopsided_camera, with_noise, with_outliers
 from .problems import POSE
@@ -184,6 +188,30 @@ def test_the_interval_holds_the_truth_though_the_model_is_wrong(error: dict[str,
     trusting = solved(**error, check=False).projector.focal.value
     assert isinstance(trusting, float)
     assert abs(trusting - FOCAL) > 4 * focal.std_formal
+
+
+def test_the_surface_allows_for_what_is_wrong_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Oracle: the sheet. Corrected for a wrong k1, its range is nearer than without."""
+    taken: list[SurfaceEstimate] = []
+    monkeypatch.setattr(
+        assemble_module, "surface_estimate",
+        lambda *of: taken.append(surface_estimate(*of)) or taken[-1],
+    )  # fmt: skip
+    solved.__wrapped__(k1=0.01)
+    solved.__wrapped__(k1=0.01, check=False)
+    truth = cast(
+        lopsided_camera(128, 96), projector_model(LAW, FOCAL, (250.0, 205.0)), (512, 400), POSE,
+        bumpy_sheet(70.0, (0.2, -0.1), 6.0, 4),
+    )  # fmt: skip
+    seen = np.isfinite(truth.depth)
+    points = truth.camera.grid_rays[seen] * truth.depth[seen][:, None]
+    range_at = LinearNDInterpolator(points[:, :2] / points[:, 2:], truth.depth[seen])
+    errors = [
+        float(np.nanmedian(np.abs(np.linalg.norm(V, axis=1) - range_at(V[:, :2] / V[:, 2:]))))
+        for V in (s.vertices for s in taken)
+    ]
+    assert errors[0] < 0.5 * errors[1]
+    assert errors[0] < 0.5
 
 
 def test_a_stated_uncertainty_is_in_the_interval_of_a_right_model_too() -> None:

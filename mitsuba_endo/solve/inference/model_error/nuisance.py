@@ -81,7 +81,8 @@ def nuisance(
     own, mean = W[extended.solved], Q @ u
     return Nuisance(
         tuple(roots), (own @ Q) @ own.T, own @ mean,
-        [X @ (W @ root) for X in extended.responses], [X @ (W @ mean) for X in extended.responses],
+        [X @ (W @ root) for X in extended.responses],
+        [-(X @ (W @ mean)) for X in extended.responses],  # surfaces give way: the step is -A^-1 B
     )  # fmt: skip
 
 
