@@ -62,11 +62,8 @@ def atomic_folder(path: str | Path, kind: Kind) -> Iterator[Path]:
     _check_steady(path, kind)
     _make_parent(path)
     aside = aside_of(path, "partial")
-    try:
+    try:  # from before it is there: a signal may come as soon as it is
         aside.mkdir()
-    except OSError as error:
-        raise not_writable(path, error) from error
-    try:
         yield aside
         write_mark(aside, kind)
         _swap(aside, path, kind)

@@ -15,6 +15,7 @@ from typing import Literal
 
 from .errors import InputError
 from .folder_mark import read_mark, remove_marked
+from .interrupts import uninterrupted
 
 State = Literal["partial", "old"]
 LONGEST_NAME = 255
@@ -78,6 +79,14 @@ def scratch_folder() -> Iterator[Path]:
     """Yield a temporary folder that is gone afterwards, at the latest with the next command."""
     sweep_scratch()
     folder = aside_of(Path(tempfile.gettempdir()) / _SCRATCH, "partial")
+    try:  # from before it is there: a signal may come as soon as it is
+        _make_scratch(folder)
+        yield folder
+    finally:
+        remove(folder)
+
+
+def _make_scratch(folder: Path) -> None:
     try:
         folder.mkdir(mode=0o700)
     except OSError as error:
@@ -86,19 +95,19 @@ def scratch_folder() -> Iterator[Path]:
             f"no temporary folder can be made ({reason})", tempfile.gettempdir(),
             "make room there, or set TMPDIR to another folder",
         ) from error  # fmt: skip
-    try:
-        yield folder
-    finally:
-        remove(folder)
 
 
 def remove(path: Path) -> None:
-    """Remove a file or folder that this program made, as far as that is possible."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-        return
-    with contextlib.suppress(OSError):  # what led here is the fault to tell
-        path.unlink(missing_ok=True)
+    """Remove a file or folder that this program made, as far as that is possible.
+
+    Signals wait until it is gone.
+    """
+    with uninterrupted():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+            return
+        with contextlib.suppress(OSError):  # what led here is the fault to tell
+            path.unlink(missing_ok=True)
 
 
 def _entries(folder: Path) -> list[Path]:

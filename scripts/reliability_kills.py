@@ -4,7 +4,9 @@ python -m scripts.reliability_kills --kills 100 --seed 1 --out kills-output
 
 Wanted: whatever signal comes when, an output is absent, the old one, or complete; Ctrl-C and
 SIGTERM end with code 130 and leave nothing half written; after the next run nothing is left over of
-SIGKILL either. A dataset is killed as a whole and by one of its workers.
+SIGKILL either. A dataset is killed as a whole and by one of its workers. What a sequence keeps
+beside its output is absent or complete, and it goes on from there to the surface of one that was
+not killed.
 """
 
 import os
@@ -29,6 +31,8 @@ PATIENCE_S = 60.0
 EARLIEST_S = 0.3
 LITTER = ("*.endo-*", "*.partial*", "*.old")
 INTERRUPTED = 130
+SURFACE = "mesh.ply"
+"""Of a sequence's folder."""
 Option = typer.Option
 
 
@@ -40,7 +44,7 @@ class Patient:
         folder.mkdir(parents=True)
         command.prepare(folder)
         started = time.monotonic()
-        run(folder, *command.arguments)
+        run(folder, *command.arguments, program=command.program)
         self.seconds = time.monotonic() - started
         self.whole = contents(folder / command.out)
 
@@ -50,7 +54,8 @@ class Patient:
             self._forget()
         before = contents(self.folder / self.command.out)
         number = SIGNALS[int(rng.integers(len(SIGNALS)))]
-        process = start(self.folder, self.command.arguments)
+        arguments = self.command.arguments_in(self.folder)
+        process = start(self.folder, arguments, self.command.program)
         # Half of them near the end, where the writing is.
         first = EARLIEST_S if rng.random() < 0.5 else 0.7 * self.seconds
         moment = rng.uniform(first, self.seconds)
@@ -74,9 +79,12 @@ class Patient:
         return alive
 
     def end(self) -> None:
-        """Run the command once more and see that nothing is left over."""
-        run(self.folder, *self.command.arguments)
+        """Run the command once more, or let it go on, and see that nothing is left over."""
+        arguments = self.command.arguments_in(self.folder)
+        run(self.folder, *arguments, program=self.command.program)
         left = leftovers(self.folder)
+        if self._beside is not None and self._beside.exists():
+            left.append(self._beside.name)
         if left:
             self.faults.append(f"left over after the next run: {left}")
         if self._is_dataset:
@@ -84,6 +92,19 @@ class Patient:
             other = [k for k in {*now, *self.whole} if now.get(k) != self.whole.get(k)]
             if other:
                 self.faults.append(f"differs from the uninterrupted one in {sorted(other)[:5]}")
+
+        self._compare_surface()
+
+    def _compare_surface(self) -> None:
+        """See that a sequence that was killed found the surface of one that was not."""
+        now = contents(self.folder / self.command.out)
+        if self._beside is not None and now.get(SURFACE) != self.whole.get(SURFACE):
+            self.faults.append("its surface is not the uninterrupted one's")
+
+    @property
+    def _beside(self) -> Path | None:
+        beside = self.command.beside
+        return None if beside is None else self.folder / beside
 
     @property
     def _is_dataset(self) -> bool:
@@ -93,7 +114,7 @@ class Patient:
         self, how: str, code: int, said: str, before: dict[str, bytes], struck: bool,
         number: signal.Signals,
     ) -> None:  # fmt: skip
-        if "Traceback" in said or len(said.splitlines()) > 1:
+        if "Traceback" in said or len(_beside_progress(said)) > 1:
             self.faults.append(f"{how}: said {said[-300:]!r}")
         if struck and number is not signal.SIGKILL:
             if code not in (0, 1, INTERRUPTED):
@@ -112,6 +133,8 @@ class Patient:
             samples = out / "samples"
             folders = [p for p in samples.glob("[0-9]*") if p.is_dir()] if samples.exists() else []
             return next((fault for p in folders if (fault := _fault(p))), None)
+        if self._beside is not None and self._beside.exists() and (fault := _fault(self._beside)):
+            return fault
         if not out.exists() or now == before:
             return None
         return _fault(out) if out.is_dir() else _cut(now, self.whole)
@@ -120,6 +143,8 @@ class Patient:
         out = self.folder / self.command.out
         shutil.rmtree(out, ignore_errors=True)
         out.unlink(missing_ok=True)
+        if self._beside is not None:
+            shutil.rmtree(self._beside, ignore_errors=True)
 
 
 def _fault(folder: Path) -> str | None:
@@ -127,6 +152,11 @@ def _fault(folder: Path) -> str | None:
     if mark is None or files_in(folder) != mark.files:
         return f"{folder.name} is not what its mark lists"
     return None
+
+
+def _beside_progress(said: str) -> list[str]:
+    """Return the lines of a command's stderr but those that tell of progress, after two seconds."""
+    return [line for line in said.splitlines() if not line.startswith("[ ")]
 
 
 def _cut(now: dict[str, bytes], whole: dict[str, bytes]) -> str | None:

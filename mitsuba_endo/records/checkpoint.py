@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,11 @@ from ..errors import InputError
 from ..files import atomic_path
 from ..reading.npz import Arrays, open_npz
 from ..reading.regular import is_file
+from .sealed_arrays import SEAL, check_seal, seal_of
 
 FILE = "state.npz"
-FORMAT = 2
-"""Of the file; version 0.1 wrote files without a number."""
+FORMAT = 3
+"""Of the file; version 0.1 wrote files without a number, and 2 had no checksum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +71,9 @@ def save_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
             for key, array in s.arrays.items()
         },
     }
+    sealed: dict[str, Any] = arrays | {SEAL: seal_of(arrays.items())}
     with atomic_path(path) as aside:
-        np.savez_compressed(aside, **arrays)
+        np.savez_compressed(aside, **sealed)
 
 
 def load_checkpoint(folder: str | Path) -> Checkpoint:
@@ -88,6 +91,7 @@ def load_checkpoint(folder: str | Path) -> Checkpoint:
                 "was written by another version of this program", str(path),
                 "calibrate anew without --resume",
             )  # fmt: skip
+        check_seal(data, "calibrate anew without --resume")
         return _read(data)
 
 

@@ -21,9 +21,10 @@ from pydantic import BaseModel
 
 from ..files import atomic_path
 from ..reading.npz import Arrays, open_npz
+from .sealed_arrays import SEAL, check_seal, seal_of
 
-FORMAT = 1
-"""Of the file."""
+FORMAT = 2
+"""Of the file; 1 had no checksum."""
 PACKAGE = __name__.partition(".")[0]
 LEVEL = 1
 """Of compression: noise hardly shrinks further, and saving holds the work up."""
@@ -45,6 +46,7 @@ def save_objects(path: str | Path, roots: Mapping[str, object]) -> None:
     tree = json.dumps({"format": FORMAT, "roots": writer.node(dict(roots))}).encode()
     arrays = {"tree": np.frombuffer(tree, np.uint8)}
     arrays |= {f"array_{k}": array for k, array in enumerate(writer.arrays)}
+    arrays[SEAL] = seal_of(arrays.items())
     with (
         atomic_path(path) as aside,
         zipfile.ZipFile(aside, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as file,
@@ -63,12 +65,13 @@ def load_objects(path: str | Path, what: str, todo: str) -> dict[str, Any]:
         todo: what to do then.
 
     Raises:
-        InputError: missing, damaged, or of another version.
+        InputError: missing, damaged, changed since it was written, or of another version.
     """
     with open_npz(path, what, todo) as data:
         tree = json.loads(bytes(data.get("tree", (None,), "u")))
         if tree["format"] != FORMAT:
             raise ValueError
+        check_seal(data, todo)
         found = _Reader(data).value(tree["roots"])
         if not isinstance(found, dict):
             raise ValueError

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel, projector_model
 from ..geometry.transforms import RigidTransform
+from ..interrupts import uninterrupted
 from ..litter import scratch_folder
 from ..reading.regular import is_file
 from ..reading.xml_guard import read_xml
@@ -160,7 +161,9 @@ def open_scene(source: str | Path, **parameters: object) -> tuple[Any, Mapping[s
         resolved = {name: generate(name, value, folder) for name, value in values.items()}
         check_references(root, path.parent, resolved)
         try:
-            return mi.load_file(str(path), **resolved), values
+            # Mitsuba makes of an interrupt in a plugin of Python's an error of the scene.
+            with uninterrupted():
+                return mi.load_file(str(path), **resolved), values
         except RuntimeError as error:
             raise InputError(_message(error), str(source), "correct the scene or value") from error
 

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .readers import READERS, Reader
+from .reader import Reader
+from .readers import READERS
 
 
 def attempt(reader: Reader, seed: int, folder: Path) -> dict[str, object]:

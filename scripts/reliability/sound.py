@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from .sound_foreign import FOREIGN
+from .sound_sequence import SEQUENCE
+
 VARIABLE = "MITSUBA_ENDO_SOUND"
 """Folder in which the files are kept from one process to the next."""
 WIDTH, HEIGHT = 24, 14
@@ -181,6 +184,8 @@ def _small(form: str) -> dict[str, Any]:
 
 
 MAKERS = {
+    **FOREIGN,
+    **SEQUENCE,
     "inputs": _inputs,
     "camera yaml": _camera("yaml"),
     "camera xml": _camera("xml"),

@@ -115,7 +115,7 @@ def test_another_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """A dataclass with other fields, and another number."""
     save_objects(tmp_path / "a.npz", {"pose": RigidTransform.identity()})
     with monkeypatch.context() as patch:
-        patch.setattr(object_file, "FORMAT", 2)
+        patch.setattr(object_file, "FORMAT", 99)
         with pytest.raises(InputError, match="is not a readable"):
             load_objects(tmp_path / "a.npz", "file", "make it again")
     monkeypatch.setattr(

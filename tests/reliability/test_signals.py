@@ -1,0 +1,73 @@
+"""Ctrl-C at the moments that the campaign of kills found: nothing is left, and nothing is blamed.
+
+Oracle: KeyboardInterrupt, which the command line ends with code 130, and the files afterwards.
+"""
+
+import contextlib
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+
+from mitsuba_endo import litter
+from mitsuba_endo.files import atomic_folder
+from mitsuba_endo.folder_mark import Kind
+from mitsuba_endo.litter import scratch_folder
+
+
+@pytest.mark.usefixtures("llvm")
+def test_an_interrupt_while_a_scene_is_loaded_is_no_fault_of_the_scene(monkeypatch):
+    """Mitsuba makes a RuntimeError of whatever a plugin of Python's raises."""
+    from mitsuba_endo.rendering.mitsuba_modules import mi
+    from mitsuba_endo.rendering.scene import load_scene
+
+    load, felt = mi.load_file, []
+
+    def as_mitsuba(*arguments: object, **parameters: object) -> object:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            felt.append(True)
+            raise RuntimeError('plugin of type "doe_projector"') from None
+        return load(*arguments, **parameters)
+
+    monkeypatch.setattr(mi, "load_file", as_mitsuba)
+    with pytest.raises(KeyboardInterrupt):
+        load_scene("plane")
+    assert not felt
+
+
+@pytest.mark.parametrize("kind", ["scratch", "output"])
+def test_an_interrupt_just_after_a_folder_was_made_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+):
+    monkeypatch.setattr(litter.tempfile, "tempdir", str(tmp_path))
+    mkdir = Path.mkdir
+
+    def made(self: Path, *arguments: object, **options: object) -> None:
+        mkdir(self, *arguments, **options)  # type: ignore[arg-type]
+        if ".endo-" in self.name:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "mkdir", made)
+    folder = scratch_folder() if kind == "scratch" else atomic_folder(tmp_path / "out", Kind.MAPS)
+    with pytest.raises(KeyboardInterrupt), folder:
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_while_a_folder_is_removed_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(litter.tempfile, "tempdir", str(tmp_path))
+    rmtree = shutil.rmtree
+
+    def interrupted(*arguments: object, **options: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        rmtree(*arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(litter.shutil, "rmtree", interrupted)
+    with pytest.raises(KeyboardInterrupt), contextlib.ExitStack() as stack:
+        (stack.enter_context(scratch_folder()) / "map.exr").touch()
+    assert not list(tmp_path.iterdir())
