@@ -5,6 +5,12 @@ import signal
 import threading
 from collections.abc import Iterator
 
+SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGALRM") if hasattr(signal, name)
+]
+"""By the alarm an interrupt comes again that came while a module was loaded, see
+:mod:`.cli.entry`."""
+
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
@@ -15,7 +21,7 @@ def uninterrupted() -> Iterator[None]:
     came: list[int] = []
     before = {
         number: signal.signal(number, lambda number, frame: came.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in SIGNALS
         if callable(signal.getsignal(number))
     }
     try:

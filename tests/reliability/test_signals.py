@@ -71,3 +71,23 @@ def test_an_interrupt_while_a_folder_is_removed_waits(
     with pytest.raises(KeyboardInterrupt), contextlib.ExitStack() as stack:
         (stack.enter_context(scratch_folder()) / "map.exr").touch()
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_that_was_put_off_is_held_back_too():
+    """One that came while a module was loaded comes again by an alarm, maybe while a worker of a
+    dataset starts, which then is half started and prints a traceback."""
+    from mitsuba_endo.cli.entry import interrupt_after_loading
+    from mitsuba_endo.interrupts import uninterrupted
+
+    def block() -> None:
+        with uninterrupted():
+            signal.raise_signal(signal.SIGALRM)
+            reached.append(True)
+
+    before, reached = signal.signal(signal.SIGALRM, interrupt_after_loading), []
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            block()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert reached
