@@ -19,6 +19,8 @@ MINIMUM_LLVM = (17,)
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
 LEAST_MEMORY = 512 << 20
 """Bytes of address space: Mitsuba and LLVM take 220 MiB to start, kernels come on top."""
+_starters: set[int] = set()
+"""Numbers of processes in which Mitsuba was started: this one, and those it was forked from."""
 
 
 def use(*variants: str) -> str:
@@ -51,11 +53,26 @@ def use(*variants: str) -> str:
         _check_llvm(todo)
     _set_threads()
     _quieten()
+    _starters.add(os.getpid())
     return variant
 
 
 def ensure() -> str:
-    """Return the active variant, starting Mitsuba with the default ones if none is active."""
+    """Return the active variant, starting Mitsuba with the default ones if none is active.
+
+    Raises:
+        InputError: it was started in the process that this one was forked from. Its threads are
+            not there: a rendering would never end.
+    """
+    if _starters - {os.getpid()}:
+        raise InputError(
+            "was started before this process was forked from its parent, and cannot render here",
+            "Mitsuba", "start processes with multiprocessing.get_context('spawn')",
+        )  # fmt: skip
+    return _active()
+
+
+def _active() -> str:
     mi = sys.modules.get("mitsuba")
     variant = mi.variant() if mi else None
     if variant is None:
@@ -87,7 +104,7 @@ def ensure_derivatives() -> str:
     Raises:
         InputError: another variant is active: what was made under it would be lost by a switch.
     """
-    variant = ensure()
+    variant = _active()  # the solver renders nothing, and so works in a forked process too
     if variant not in VARIANTS:
         raise InputError(
             f"has the variant {variant} active, which the solver cannot use", "Mitsuba",
