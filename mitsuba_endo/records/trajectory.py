@@ -123,11 +123,11 @@ def load_frames(path: str | Path) -> list[FrameRow]:
         InputError: missing file, or one that is no such table.
     """
     lines = csv.DictReader(read_text(path, TABLE).splitlines())
-    if lines.fieldnames != _heads():
-        raise InputError("is no table of frames", str(path), "make it again")
     try:
+        if lines.fieldnames != _heads():
+            raise ValueError
         return [_row(cells) for cells in lines]
-    except (TypeError, ValueError, KeyError):
+    except (TypeError, ValueError, KeyError, csv.Error):
         raise InputError("is no table of frames", str(path), "make it again") from None
 
 

@@ -1,6 +1,8 @@
 """Schemas of YAML and JSON files, with errors that name the file and the field."""
 
+import contextlib
 import difflib
+from collections.abc import Iterator
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -46,6 +48,21 @@ def validate(model: type[R], data: dict[str, Any], source: str) -> R:
         raise InputError(*_explain(model, first, path, field)) from None
 
 
+@contextlib.contextmanager
+def validated(source: str) -> Iterator[None]:
+    """Refuse a file whose values make no record that the block builds.
+
+    Raises:
+        InputError: names ``source``, the field and what is wrong.
+    """
+    try:
+        yield
+    except ValidationError as error:
+        first = error.errors()[0]
+        path = ".".join(_path(first))
+        raise InputError(_misfit(first), f"{source}: {path or error.title}", "mend it") from None
+
+
 _SYMBOLS = {"K", "R", "K_std"}  # the only capitalised keys of our files
 
 
@@ -83,8 +100,12 @@ def _explain(
     if kind == "model_type":
         keys = ", ".join(_keys_at(model, path))
         return f"is not a mapping, got {shown(given)}", field, f"the keys are {keys}"
+    return _misfit(error), field, "mend the value"
+
+
+def _misfit(error: Any) -> str:
     message = error["msg"][0].lower() + error["msg"][1:]
-    return f"{message}, got {shown(given)}", field, "mend the value"
+    return f"{message}, got {shown(error.get('input'))}"
 
 
 def _keys_at(model: type[BaseModel], path: list[str]) -> list[str]:

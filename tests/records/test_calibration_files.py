@@ -1,5 +1,6 @@
 """Calibrations of OpenCV and COLMAP read as solutions: the numbers that were written."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -131,3 +132,34 @@ def test_what_is_no_calibration_is_refused(result: tuple[Path, Solution], tmp_pa
         read_calibration(tmp_path / "folder")
     with pytest.raises(InputError, match="no such file"):
         read_calibration(tmp_path / "absent.json")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (r"projector_width: \d+", "projector_width: {}", "width: input should be a valid integer"),
+        ("projector_law: pinhole", "projector_law: nothing", "law: "),
+    ],
+)
+def test_values_that_make_no_projector_are_refused(
+    result: tuple[Path, Solution], tmp_path: Path, old: str, new: str, words: str
+):
+    path = tmp_path / "camera.yml"
+    export(result[0], "opencv", path)
+    text = re.sub(old, new, path.read_text())
+    assert new in text
+    path.write_text(text)
+    with pytest.raises(InputError, match=re.escape(words)):
+        read_calibration(path)
+
+
+def test_infinite_numbers_of_a_model_are_refused(result: tuple[Path, Solution], tmp_path: Path):
+    export(result[0], "colmap", tmp_path / "model")
+    path = tmp_path / "model" / "cameras.txt"
+    lines = path.read_text().splitlines()
+    last = next(k for k in reversed(range(len(lines))) if not lines[k].startswith("#"))
+    parts = lines[last].split()
+    lines[last] = " ".join([*parts[:4], "1e400", *parts[5:]])
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=r"input should be a finite number, got inf"):
+        read_calibration(tmp_path / "model")

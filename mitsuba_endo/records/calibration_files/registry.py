@@ -7,6 +7,7 @@ from pathlib import Path
 from ...errors import InputError
 from ..solution import Solution
 from ..solution_checks import check_solution
+from ..validation import validated
 
 Matches = Callable[[Path], bool]
 Read = Callable[[Path], Solution]
@@ -48,7 +49,8 @@ def read_calibration(path: str | Path) -> tuple[Solution, str]:
     path = Path(path)
     for form in CALIBRATION_FORMATS.values():
         if form.matches(path):
-            return check_solution(form.read(path), str(path)), form.name
+            with validated(str(path)):
+                return check_solution(form.read(path), str(path)), form.name
     raise InputError(
         "holds no calibration", str(path), f"give one of {', '.join(CALIBRATION_FORMATS)}"
     )
