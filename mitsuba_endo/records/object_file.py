@@ -142,6 +142,8 @@ class _Reader:
 
     def _object(self, number: int, name: str, content: dict[str, Any]) -> object:
         cls = _class(name)
+        if not isinstance(content, dict):
+            raise TypeError
         made = self._objects[number] = object.__new__(cls)
         values = {key: self.value(node) for key, node in content.items()}
         if is_dataclass(cls) and values.keys() != {field.name for field in fields(cls)}:
@@ -161,12 +163,15 @@ def _name(cls: type) -> str:
     return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def _class(name: str) -> type:
+def _class(name: object) -> type:
     """Return a class of this package.
 
     Raises:
+        TypeError: the name is no text.
         ValueError: there is none of this name.
     """
+    if not isinstance(name, str):
+        raise TypeError
     module, _, own = name.partition(":")
     if module.partition(".")[0] != PACKAGE or module.endswith("__main__"):
         raise ValueError

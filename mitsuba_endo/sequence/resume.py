@@ -10,7 +10,7 @@ from ..reading.regular import is_file
 from ..records.object_file import load_objects, save_objects
 from ..records.rig import Rig
 from .options import SequenceOptions
-from .run import OnFrame, Run
+from .run import OnFrame, Recorded, Run
 
 FILE = "state.npz"
 SUFFIX = ".unfinished"
@@ -97,10 +97,25 @@ def load_state(folder: str | Path) -> Past:
     if path is None:
         raise InputError("no such file", str(places[-1]), "name the folder of an earlier sequence")
     found = load_objects(path, _WHAT, _TODO)
-    try:
-        return Past(found["state"], found["marks"], found["decoding"], str(path))
-    except KeyError:
-        raise InputError(f"is not a readable {_WHAT}", str(path), _TODO) from None
+    if not _is_state(found):
+        raise InputError(f"is not a readable {_WHAT}", str(path), _TODO)
+    return Past(found["state"], found["marks"], found["decoding"], str(path))
+
+
+def _is_state(found: dict[str, Any]) -> bool:
+    """Tell whether objects are those of :func:`save_state`, as far as they are looked at first."""
+    state, marks = found.get("state"), found.get("marks")
+    if not isinstance(state, dict) or not isinstance(marks, list):
+        return False
+    recorded = state.get("recorded")
+    return (
+        isinstance(state.get("_options"), SequenceOptions)
+        and isinstance(recorded, Recorded)
+        and isinstance(recorded.rig, Rig)
+        and isinstance(recorded.rows, list)
+        and isinstance(found.get("decoding"), Decoding)
+        and all(isinstance(mark, str) for mark in marks)
+    )
 
 
 def unfinished_of(folder: str | Path) -> Path:

@@ -98,12 +98,13 @@ def test_what_acts_is_not_saved(tmp_path: Path) -> None:
 NAMES = [
     "os:system", "subprocess:Popen", "mitsuba_endo.__main__:app", "mitsuba_endo.nothing:A",
     "mitsuba_endo.fusion.tsdf:Nothing", "mitsuba_endo.fusion.tsdf:np", "mitsuba_endo.files:Path",
+    None, 3, {"a": "b"},
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_only_classes_of_the_package_are_made(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(object_file, "_name", lambda _cls: name)
     save_objects(tmp_path / "a.npz", {"volume": Volume(1.0)})

@@ -8,6 +8,7 @@ import pytest
 
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.correspondence import write_map
+from mitsuba_endo.records.object_file import save_objects
 from mitsuba_endo.records.trajectory import FrameRow
 from mitsuba_endo.sequence.inputs import Feed, frames_of
 from mitsuba_endo.sequence.options import SequenceOptions
@@ -158,4 +159,20 @@ def test_a_folder_without_a_state_is_refused(tmp_path: Path) -> None:
         load_state(tmp_path)
     np.savez(tmp_path / "state.npz", a=np.zeros(3))
     with pytest.raises(InputError, match="'tree' is missing"):
+        load_state(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"state": None}, {"state": {}}, {"marks": [3]}, {"decoding": {"refine": True}}, {"marks": ()}],
+)
+def test_objects_that_are_no_state_are_refused(
+    past: Past, tmp_path: Path, change: dict[str, object]
+) -> None:
+    """They are read as objects of this version are, and lack what a sequence goes on from."""
+    whole = {"state": past.state, "marks": past.marks, "decoding": past.decoding}
+    save_objects(tmp_path / "state.npz", whole)
+    assert load_state(tmp_path).marks == past.marks
+    save_objects(tmp_path / "state.npz", whole | change)
+    with pytest.raises(InputError, match="is not a readable state of a sequence"):
         load_state(tmp_path)
