@@ -15,7 +15,7 @@ from ..records.solution import Estimate, Frame, LeftOut, Outcome, PoseEstimate, 
 from ..records.trajectory import FrameRow
 from ..robust import robust_std
 from ..solve.reporting.assemble import versions
-from .adjustment.finish import FinishedPart, with_deviations
+from .adjustment.refusion import FinishedPart, with_deviations
 from .bootstrap import Beginning
 from .finish import Finished, finish
 from .frames import PicturedMap

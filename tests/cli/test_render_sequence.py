@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = _render(folder / "way", "withdrawal", "--frames", COUNT, "--noise", 0.2, "--nothing",
                    "10:12", "--seed", 3)  # fmt: skip
     assert done.exit_code == 0, done.stderr
-    assert f"{COUNT} maps. Track them: mitsuba-endo sequence" in done.stdout.replace("\n", " ")
+    assert f"{COUNT} maps. Track them: mitsuba-endo sequence" in " ".join(done.stdout.split())
     return folder
 
 

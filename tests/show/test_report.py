@@ -479,7 +479,7 @@ def test_the_drawn_cost_falls():
     """Oracle: residuals that halve: the cost under the loss of the end falls with each step, also
     where the loss that was minimised changed, and missed correspondences cost the most."""
     from mitsuba_endo.records.calibration import TraceRow
-    from mitsuba_endo.solve.costs.robust_loss import NoiseScale
+    from mitsuba_endo.solve.costs.noise_scale import NoiseScale
     from mitsuba_endo.solve.minimisers.result import with_fixed_cost
 
     base = np.abs(np.random.default_rng(0).normal(size=256))

@@ -16,8 +16,6 @@ from .phase_unwrapping import unwrap
 from .settings import MatcherSettings
 
 DEFAULTS = MatcherSettings()
-BRIGHTEST = 0.99
-"""Quantile of the brightness that tells a dark image: glints are fewer pixels. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,7 @@ def decode_image(
 
 
 def _fault_of_light(gray: NDArray[np.float32], settings: MatcherSettings) -> str:
-    if np.quantile(gray, BRIGHTEST) < settings.dark:
+    if np.quantile(gray, settings.brightest) < settings.dark:
         return "the image is dark: "
     if (gray >= settings.saturated).mean() > 0.5:
         return "the image is saturated: "

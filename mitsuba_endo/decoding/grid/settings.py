@@ -146,6 +146,8 @@ class MatcherSettings:
     clean validation views: 0.09 pattern pixels there and below."""
     dark: float = 8 / 255
     """Of full scale: an image whose brightest hundredth is below it is called dark. By hand."""
+    brightest: float = 0.99
+    """Quantile of the brightness that tells a dark image: glints are fewer pixels. By hand."""
     saturated: float = 254.5 / 255
     """Of full scale. Geometry: the last grey level of 8 bits."""
 
