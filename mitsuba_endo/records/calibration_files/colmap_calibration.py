@@ -67,6 +67,8 @@ def _camera(model: SparseModel, number: str, path: Path) -> Values:
 
 def _projector(values: Values) -> ProjectorEstimate:
     (fx, _, cx), (_, fy, cy), _ = values["K"]
+    if not (fx > 0 and fy > 0):
+        raise InputError("a projector's focal length is not positive", "cameras", "fit it again")
     if any(values["distortion"][5:]):
         raise InputError("a projector has k4 to k6", "cameras", "fit it without")
     distortion = [float(k) for k in values["distortion"][:5]]
