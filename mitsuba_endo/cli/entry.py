@@ -2,6 +2,7 @@
 
 import signal
 import sys
+import weakref
 from types import FrameType
 
 from ..memory import left
@@ -23,6 +24,8 @@ _SIGNALS = [
 RETRY = 0.05
 """Seconds after which an interrupt that came while a module was loaded is tried again."""
 LOADER = "<frozen importlib._bootstrap>"
+CALLBACKS = weakref.__file__
+"""Functions that Python calls when an object goes; what they raise is printed and lost."""
 
 
 def main() -> None:
@@ -64,10 +67,11 @@ def interrupt_after_loading(number: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt, but not while a module is being loaded: then try again later.
 
     Libraries load optional ones within ``except BaseException``: there an interrupt was lost and
-    the command went on, or a module was left half made.
+    the command went on, or a module was left half made. It is lost likewise while an object goes.
     """
     while frame is not None:
-        if frame.f_code.co_filename == LOADER:
+        code = frame.f_code
+        if code.co_filename in (LOADER, CALLBACKS) or code.co_name == "__del__":
             signal.setitimer(signal.ITIMER_REAL, RETRY)
             return
         frame = frame.f_back

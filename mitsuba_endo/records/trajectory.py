@@ -137,7 +137,7 @@ def _row(cells: dict[str, str]) -> FrameRow:
 
     def numbers(prefix: str, names: Sequence[str]) -> NDArray[np.float64] | None:
         texts = [cells[f"{prefix}_{name}"] for name in names]
-        return np.array([float(text) for text in texts]) if all(texts) else None
+        return np.array([_finite(text) for text in texts]) if all(texts) else None
 
     def pose(prefix: str) -> RigidTransform | None:
         values = numbers(prefix, _POSE)
@@ -145,12 +145,19 @@ def _row(cells: dict[str, str]) -> FrameRow:
             return None
         return RigidTransform(Rotation.from_quat(values[3:]).as_matrix(), values[:3])
 
-    further = {name: float(cells[name]) if cells[name] else None for name in _FURTHER}
+    further = {name: _finite(cells[name]) if cells[name] else None for name in _FURTHER}
     return FrameRow(
         int(cells["number"]), cells["name"], cells["lost"], int(cells["part"]),
         cells["keyframe"] == "1", pose("camera"), pose("projector"),
         numbers("camera_std", _STEP), numbers("projector_std", _STEP), **further,
     )  # fmt: skip
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not np.isfinite(value):  # what does not exist is an empty field
+        raise ValueError
+    return value
 
 
 def _heads() -> list[str]:

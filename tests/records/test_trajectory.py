@@ -79,7 +79,8 @@ def test_table_reads_back(tmp_path: Path) -> None:
     assert (b.lost, b.world_from_camera, b.camera_std) == ('it is "dark", and moved', None, None)
     text = path.read_text()
     long = "x" * 200_000  # of a field more than the csv module takes
-    wrongs = ("", "a,b\n1,2\n", text.replace("1.25", "much"), text + "1,2,3\n")
+    wrongs = ("", "a,b\n1,2\n", text.replace("1.25", "much"), text.replace("1.25", "inf"),
+              text + "1,2,3\n")  # fmt: skip
     for wrong in (*wrongs, text + long, long + text):
         path.write_text(wrong)
         with pytest.raises(InputError, match="is no table of frames"):

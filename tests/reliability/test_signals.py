@@ -6,6 +6,8 @@ Oracle: KeyboardInterrupt, which the command line ends with code 130, and the fi
 import contextlib
 import shutil
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -91,3 +93,41 @@ def test_an_interrupt_that_was_put_off_is_held_back_too():
     finally:
         signal.signal(signal.SIGALRM, before)
     assert reached
+
+
+@pytest.mark.parametrize("way", ["__del__", "weak dictionary"])
+def test_an_interrupt_while_an_object_goes_is_not_lost(way: str):
+    """Python prints what is raised there, and goes on. Oracle: the interrupt comes, afterwards."""
+    code = WHILE_AN_OBJECT_GOES.replace("WAY", way)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "interrupted\n", done
+    assert done.stderr == ""
+
+
+WHILE_AN_OBJECT_GOES = """
+import signal, sys, time, weakref
+from mitsuba_endo.cli.entry import interrupt_after_loading
+signal.signal(signal.SIGINT, interrupt_after_loading)
+signal.signal(signal.SIGALRM, interrupt_after_loading)
+
+class Thing:
+    def __del__(self):
+        if "WAY" == "__del__":
+            signal.raise_signal(signal.SIGINT)
+
+def strike(frame, event, argument):
+    if frame.f_code.co_filename == weakref.__file__ and frame.f_code.co_name == "remove":
+        sys.setprofile(None)
+        signal.raise_signal(signal.SIGINT)
+
+thing, kept = Thing(), weakref.WeakValueDictionary()
+kept["a"] = thing
+try:
+    if "WAY" != "__del__":
+        sys.setprofile(strike)
+    del thing
+    time.sleep(5)
+    print("lost")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
