@@ -27,6 +27,9 @@ Index = NDArray[np.int64]
 
 STEEPEST = 0.15
 """Cosine of incidence below which an element is not looked at: 81 degrees."""
+AHEAD = 0.99
+"""Cosine of the angle, 8 degrees, within which an element lies along the ray of its pixel: a lens that
+folds outside the image may project elsewhere what is behind. Chosen."""
 REACH = 0.03
 """Distance of the observed surface from an element, parts of the range, beyond which the frame saw
 something else. Chosen: ten deviations of a range."""
@@ -151,7 +154,7 @@ def _in_view(
     pixel = row[element].astype(np.int64) * camera.width + column[element].astype(np.int64)
     rays, points = camera.grid_rays.reshape(-1, 3)[pixel], points[element]
     normals = elements.normals[element] @ pose.R
-    led = np.einsum("nk,nk->n", rays, points) > 0.99 * np.linalg.norm(points, axis=1)
+    led = np.einsum("nk,nk->n", rays, points) > AHEAD * np.linalg.norm(points, axis=1)
     kept = _within(usable).ravel()[pixel] & led & (np.einsum("nk,nk->n", rays, normals) < -STEEPEST)
     rays, normals, points = rays[kept].T, normals[kept].T, points[kept].T
     return element[kept], pixel[kept], rays, normals, dot(normals, points)
