@@ -28,8 +28,8 @@ Index = NDArray[np.int64]
 STEEPEST = 0.15
 """Cosine of incidence below which an element is not looked at: 81 degrees."""
 AHEAD = 0.99
-"""Cosine of the angle, 8 degrees, within which an element lies along the ray of its pixel: a lens that
-folds outside the image may project elsewhere what is behind. Chosen."""
+"""Cosine of the angle, 8 degrees, within which an element lies along the ray of its pixel: a lens
+that folds outside the image may project elsewhere what is behind. Chosen."""
 REACH = 0.03
 """Distance of the observed surface from an element, parts of the range, beyond which the frame saw
 something else. Chosen: ten deviations of a range."""
