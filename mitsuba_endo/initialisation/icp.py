@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_endo.robust import geman_mcclure_weight
+
 from .range_image import Level
 from .similarity import Similarities
 
@@ -126,7 +128,7 @@ def normal_equations(
     """
     J, about = jacobian(found.moved, found.normals)
     n = found.residual.shape[1]
-    robust = found.partner / (1 + (found.residual / scale) ** 2) ** 2 / n
+    robust = found.partner * geman_mcclure_weight(found.residual / scale) / n
     # Both the row and the residual carry the noise weight; the residual has it already.
     weighted = J * (robust * found.weight)[..., None]
     A = np.swapaxes(weighted, 1, 2) @ (J * found.weight[..., None])

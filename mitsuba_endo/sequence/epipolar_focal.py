@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform, tangent_basis
+from ..robust import geman_mcclure_weight
 from .linearise import Triangulated, orthonormal, triangulate
 from .placement import FAR, noise_of
 from .view import SAMPLES, ThinnedMap
@@ -148,7 +149,7 @@ def _equations(view: ThinnedMap, projector: ProjectorModel, pose: RigidTransform
 def _linear(found: Triangulated, pose: RigidTransform, noise: float) -> _Equations:
     basis = pose_directions(pose)
     r = found.across / noise
-    weight = np.where(found.good, 1 / (1 + (r / FAR) ** 2) ** 2, 0.0)
+    weight = np.where(found.good, geman_mcclure_weight(r / FAR), 0.0)
     J = np.concatenate([basis.T @ found.by_pose[:6], found.by_pose[6:]]) / noise
     A = (J * weight) @ J.T
     A[np.arange(5), np.arange(5)] += 1e-9 * np.trace(A[:5, :5]) / 5

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..fusion import Volume
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from ..robust import robust_std
+from ..robust import geman_mcclure_weight, robust_std
 from ..solve.costs.drift import step_between
 from .linearise import AgainstMap, Poses, Triangulated, against_map, triangulate
 from .view import PixelSample
@@ -191,10 +191,10 @@ def _rows(
 ) -> tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]:
     """Return derivatives, weights and residuals, across the lines (6, N) and to the map (12, N)."""
     r = found.across / noise
-    on_line = np.where(found.good, 1 / (1 + (r / FAR) ** 2) ** 2, 0.0)
+    on_line = np.where(found.good, geman_mcclure_weight(r / FAR), 0.0)
     std = deviation(found, seen, noise, voxel)
     d = -seen.distance / std
-    on_map = np.where(seen.known, on_line / (1 + (d / FAR / widened) ** 2) ** 2, 0.0)
+    on_map = np.where(seen.known, on_line * geman_mcclure_weight(d / FAR / widened), 0.0)
     return (found.by_pose[:6] / noise, on_line, r), (seen.by_poses / std, on_map, d)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ...initialisation.vectors import cross, dot
-from ...robust import robust_std
+from ...robust import geman_mcclure_weight, robust_std
 from ..linearise import Poses, coordinates_at, dot2
 from ..placement import FAR
 from ..view import ThinnedMap
@@ -122,20 +122,15 @@ def observe(
     near = at.good & (np.abs(along) < REACH * range_ * at.slope)
     noise = max(robust_std(across[near]), 1e-3) if near.any() else frame.noise
     by_camera = -np.concatenate([cross(rays * range_, normals), normals]) * (at.slope / cosine)
-    on_line = np.where(near, _loss_weight(across / noise), 0.0)
+    on_line = np.where(near, geman_mcclure_weight(across / noise / FAR), 0.0)
     seen = Seen(
         element, _blocks(pixel, frame.view.usable.shape), along / noise,
         np.concatenate([at.by_pose(at.tangent), by_camera, at.by_focal(at.tangent)]) / noise,
         at.slope / cosine / noise, across / noise,
         np.concatenate([at.by_pose(at.normal), 0 * by_camera, at.by_focal(at.normal)]) / noise,
-        on_line, on_line * _loss_weight(along / noise / widened), noise,
+        on_line, on_line * geman_mcclure_weight(along / noise / widened / FAR), noise,
     )  # fmt: skip
     return seen.rows(seen.weight > _LEAST_WEIGHT)
-
-
-def _loss_weight(residual: Floats) -> Floats:
-    """Return the weights of Geman and McClure's loss."""
-    return 1 / (1 + (residual / FAR) ** 2) ** 2
 
 
 def _in_view(
