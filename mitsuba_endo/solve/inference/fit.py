@@ -1,6 +1,7 @@
 """What solving leads to: frames solved alone, and a fit under one projection model."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ class Fit:
     history: list[Snapshot]
     """Coarse states from the start to the end."""
 
-    @property
+    @cached_property
     def estimate(self) -> State:
         """``state``, with unknowns and surfaces moved by what errors of given values did to them.
 

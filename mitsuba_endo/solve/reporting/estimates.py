@@ -24,7 +24,6 @@ from ..inference.observability import (
 )
 from ..unknowns.block import BLOCKS, VectorBlock
 from ..unknowns.layout import Layout
-from ..unknowns.state import State
 from .scale import Unit
 
 Floats = NDArray[np.float64]
@@ -47,11 +46,6 @@ class Estimates:
     @property
     def layout(self) -> Layout:
         return self.fit.problem.layout
-
-    @cached_property
-    def state(self) -> State:
-        """See :attr:`Fit.estimate`."""
-        return self.fit.estimate
 
     @cached_property
     def names(self) -> list[Unknown]:
@@ -108,7 +102,7 @@ class Estimates:
     def vector(self, name: str, frame: int) -> Estimate:
         """Return the estimate of an array, null where the data do not determine it."""
         block = _vector_block(name)
-        value, slot = self.state.at(name, frame), self.layout.slot(name, frame)
+        value, slot = self.fit.estimate.at(name, frame), self.layout.slot(name, frame)
         reported = block.reported(value)
         if slot is None:
             return Estimate(value=_plain(block, reported), status="fixed")
@@ -130,7 +124,7 @@ class Estimates:
 
     def pose(self, name: str, frame: int) -> PoseEstimate:
         """Return the estimate of a pose, null where the data do not determine it."""
-        own, slot = self.state.at(name, frame), self.layout.slot(name, frame)
+        own, slot = self.fit.estimate.at(name, frame), self.layout.slot(name, frame)
         pose = self.unit.pose(own)
         if slot is None:
             return PoseEstimate.of(pose, std=[0.0] * 6, status="fixed")
