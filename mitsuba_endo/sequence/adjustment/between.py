@@ -137,7 +137,7 @@ def _follows(seen: Seen, weights: Weights, adjusted: Adjusted) -> Floats:
     by = seen.by_unknowns[:FRAME] * (weights.along * seen.by_element) / adjusted.design
     out = np.zeros((FRAME, len(adjusted.covariance.matrix)))
     for part in adjusted.equations.responses:
-        first, end = np.searchsorted(seen.element, [part.first, part.first + part.g.shape[1]])
-        g = part.g[:, seen.element[first:end] - part.first]
-        out[:, part.columns] += by[:, first:end] @ g.T
+        here = part.among(seen.element)
+        g = part.g[:, seen.element[here] - part.first]
+        out[:, part.columns] += by[:, here] @ g.T
     return out

@@ -84,12 +84,9 @@ def _scores(
     own = np.stack([np.bincount(seen.block, row, count) for row in rows], axis=1).astype(float)
     parts = [(columns_of(k, size), own)]
     for response in at.responses:
-        first, end = np.searchsorted(
-            seen.element, [response.first, response.first + response.g.shape[1]]
-        )
-        if first == end:
+        here = response.among(seen.element)
+        if here.start == here.stop:
             continue
-        here = slice(first, end)
         by_block = sp.csr_array(
             (
                 (score * seen.by_element)[here],

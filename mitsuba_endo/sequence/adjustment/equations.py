@@ -46,6 +46,11 @@ class Response:
     g: NDArray[np.float32]
     """(C, elements)."""
 
+    def among(self, element: Index) -> slice:
+        """Return where its elements lie among ascending numbers of elements."""
+        first, end = np.searchsorted(element, [self.first, self.first + self.g.shape[1]])
+        return slice(int(first), int(end))
+
 
 @dataclass(frozen=True, eq=False)
 class Equations:
