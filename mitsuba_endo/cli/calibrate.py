@@ -10,6 +10,7 @@ from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, 
 from .decode import Refine
 from .live import watching
 from .map_options import MapConvention, Mask
+from .options import names_in
 
 if TYPE_CHECKING:
     from ..records.checkpoint import Checkpoint
@@ -174,7 +175,7 @@ def calibrate(
 
 def _extras(text: str) -> list[str]:
     """Return the names in a list of further files, refused before any work if unknown."""
-    names = [part.strip() for part in text.split(",") if part.strip()]
+    names = names_in(text)
     if names:
         from ..show.extras import check_extras
 

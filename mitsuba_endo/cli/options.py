@@ -21,3 +21,8 @@ Host = Annotated[
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser.")]
 
 PORT, HOST = 8080, "localhost"
+
+
+def names_in(text: str) -> list[str]:
+    """Return the names in a list with commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]

@@ -12,6 +12,7 @@ from .calibrate import Pattern
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 from .decode import Refine
 from .live import watching_sequence
+from .options import names_in
 
 if TYPE_CHECKING:
     from ..records.rig import Rig
@@ -108,10 +109,12 @@ def sequence(
 
 def _kinds(text: str) -> list[str]:
     """Return the names in a list of further files, refused before any work if unknown."""
-    from ..show.sequence_views import check_kinds
+    names = names_in(text)
+    if names:
+        from ..show.extras import check_extras
+        from ..show.sequence_views import KINDS
 
-    names = [part.strip() for part in text.split(",") if part.strip()]
-    check_kinds(names, "--save")
+        check_extras(names, "--save", KINDS)
     return names
 
 

@@ -1,6 +1,6 @@
 """What a solution folder holds on request: a new kind of file is one function here."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,15 +35,20 @@ def extra(name: str) -> Callable[[Save], Save]:
     return register
 
 
-def check_extras(names: Sequence[str], where: str) -> None:
-    """Refuse names that nobody registered.
+def check_extras(names: Sequence[str], where: str, known: Collection[str] = EXTRAS) -> None:
+    """Refuse names of files that are not written.
+
+    Args:
+        names: that were asked for.
+        where: option or argument.
+        known: those that there are.
 
     Raises:
         InputError: names the first one and those that there are.
     """
     for name in names:
-        if name not in EXTRAS:
-            raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(EXTRAS)}")
+        if name not in known:
+            raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(known)}")
 
 
 def write_depth(path: Path, points: NDArray[np.float64]) -> None:

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..evaluate.depth import RayCaster
 from ..records.trajectory import FrameRow
 from ..sequence.outcome import SequenceResult
-from .extras import write_depth, write_points
+from .extras import check_extras, write_depth, write_points
 
 Floats = NDArray[np.float64]
 
@@ -54,24 +54,13 @@ class SequenceViews:
         return self._casters[row.part]
 
 
-def check_kinds(names: Sequence[str], where: str) -> None:
-    """Refuse names of files that a sequence does not write.
-
-    Raises:
-        InputError: names the first one and those that there are.
-    """
-    for name in names:
-        if name not in KINDS:
-            raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(KINDS)}")
-
-
 def save_views(folder: Path, found: SequenceResult, kinds: Sequence[str]) -> None:
     """Write files of every placed frame of parts with a surface into folders of their kind's name.
 
     Raises:
         InputError: an unknown kind, or a file cannot be written.
     """
-    check_kinds(kinds, "kinds")
+    check_extras(kinds, "kinds", KINDS)
     if not kinds:
         return
     views = SequenceViews(found)
