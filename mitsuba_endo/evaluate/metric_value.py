@@ -1,9 +1,10 @@
-"""A metric that may be unknown, with the reason."""
+"""A metric that may be unknown, with the reason, and means of several."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -27,4 +28,9 @@ def rms(metrics: Sequence[Metric], names: Sequence[str]) -> Metric:
         return Metric.unknown(reason or "there are no frames")
     if missing:
         reason = f"over {len(known)} of {len(metrics)} frames ({reason})"
-    return Metric(float(np.sqrt(np.mean(np.square(known)))), reason)
+    return Metric(root_mean_square(known), reason)
+
+
+def root_mean_square(values: ArrayLike) -> float:
+    """Return the root of the mean square of numbers, any shape but empty, in their unit."""
+    return float(np.sqrt(np.mean(np.square(values))))

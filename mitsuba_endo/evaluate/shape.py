@@ -13,6 +13,7 @@ from ..records.calibration import SurfaceEstimate
 from .alignment import Similarity, align_robustly
 from .depth import Floats, RayCaster, range_image
 from .distance import distance_to_mesh
+from .metric_value import root_mean_square
 
 Alignment = Literal["none", "scale", "rigid", "similarity"]
 
@@ -81,9 +82,9 @@ def compare_shape(
     difference = (found - true_range)[np.isfinite(found) & np.isfinite(true_range)]
     wanted = _reached(truth_caster, true_range, camera, lighting)
     return ShapeErrors(
-        rmse=_rms(distance),
+        rmse=root_mean_square(distance),
         median=float(np.median(distance)),
-        ray_rmse=_rms(difference) if len(difference) else None,
+        ray_rmse=root_mean_square(difference) if len(difference) else None,
         coverage=float(np.isfinite(found[wanted]).mean()) if wanted.any() else None,
         alignment_scale=similarity.scale,
     )
@@ -128,7 +129,3 @@ def _reached(
     lit = seen.copy()
     lit[seen] = on_pattern & ~shadowed
     return lit
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

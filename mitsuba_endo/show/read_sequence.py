@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..errors import InputError
-from ..evaluate.sequence_errors import TrackedFrames
+from ..evaluate.tracked_frames import TrackedFrames
 from ..reading.regular import is_file
 from ..records.solution import load_solution
 from ..records.surface import SURFACE, load_surface

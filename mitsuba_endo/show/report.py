@@ -5,7 +5,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from ..evaluate.sequence_errors import TrackedFrames
+from ..evaluate.tracked_frames import TrackedFrames
 from ..files import atomic_path
 from ..records.calibration import Calibration
 from . import report_content as content

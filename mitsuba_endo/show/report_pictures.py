@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..evaluate.sequence_errors import TrackedFrames
+from ..evaluate.tracked_frames import TrackedFrames
 from ..records.calibration import Calibration
 from . import figures
 from .frame_charts import frame_charts

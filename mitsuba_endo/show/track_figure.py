@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..evaluate.sequence_errors import TrackedFrames
+from ..evaluate.tracked_frames import TrackedFrames
 from ..geometry.transforms import RigidTransform
 from ..records.solution import INTERVAL, Solution
 from ..records.trajectory import FrameRow

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mitsuba_endo.evaluate.distance import distance_to_mesh
+from mitsuba_endo.evaluate.metric_value import root_mean_square
 from mitsuba_endo.evaluate.trajectory import (
     absolute_trajectory_error,
     relative_pose_error,
@@ -134,7 +135,7 @@ def _figures(
     found, true = _poses(rows, truth)
     rigid = trajectory_alignment(found, true, "rigid")
     aligned, plain = (
-        _rms(absolute_trajectory_error(found, true, by))
+        root_mean_square(absolute_trajectory_error(found, true, by))
         for by in (rigid, trajectory_alignment(found, true, "none"))
     )
     focal = result.solution.projector.focal
@@ -147,8 +148,9 @@ def _figures(
         figure("silently wrong", _wrong(result, truth), "", "lower", 0),
         figure("absolute trajectory error, aligned", aligned, "mm RMS", "lower", 0.3),
         figure("absolute trajectory error, first cameras put together", plain, "mm RMS", "lower"),
-        figure("error of motions over 10 frames", _rms(shift), "mm RMS", "lower"),
-        figure("error of turns over 10 frames", np.degrees(_rms(turn)), "degrees RMS", "lower"),
+        figure("error of motions over 10 frames", root_mean_square(shift), "mm RMS", "lower"),
+        figure("error of turns over 10 frames", np.degrees(root_mean_square(turn)), "degrees RMS",
+               "lower"),
         figure("scale of the way", _scale(found, true), "%", "lower", 0.3),
         figure(f"scale, worst of {WINDOW} frames", _worst_scale(found, true), "%", "lower", 0.3),
         figure("focal length", _focal_error(focal.value), "%", "lower", 0.1),
@@ -181,8 +183,8 @@ def _surface_figures(
     seen = _seen_points(truth, rng)
     near = distance_to_mesh(seen, moved, surface.faces) <= NEAR
     return [
-        figure("surface", _rms(error), "mm RMS", "lower", 0.25),
-        figure("surface, first cameras put together", _rms(plain), "mm RMS", "lower"),
+        figure("surface", root_mean_square(error), "mm RMS", "lower", 0.25),
+        figure("surface, first cameras put together", root_mean_square(plain), "mm RMS", "lower"),
         figure(f"seen surface found within {NEAR:g} mm", 100 * float(near.mean()), "%", "higher",
                90),
         figure("95 % intervals of vertices that hold the truth", held, "%", "higher", 85),
@@ -257,10 +259,6 @@ def _loop(found: list[RigidTransform], true: list[RigidTransform]) -> float:
 
 def _focal_error(value: object) -> float:
     return 100 * abs(value / FOCAL - 1) if isinstance(value, float) else float("inf")
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _peak() -> float:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mitsuba_endo.errors import InputError
-from mitsuba_endo.evaluate.sequence_errors import TrackedFrames, evaluate_sequence
+from mitsuba_endo.evaluate.sequence_errors import evaluate_sequence
 from mitsuba_endo.evaluate.sequence_metrics import SequenceMetrics
+from mitsuba_endo.evaluate.tracked_frames import TrackedFrames
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.rig import Camera
