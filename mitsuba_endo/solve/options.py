@@ -38,6 +38,6 @@ class Options:
     """Of the random samples in the search for a start."""
     check_model: bool = True
     """Whether to test the model against its residuals, name what of it may be wrong, and carry that
-    into the intervals. Estimates stay as they are."""
+    into estimates and intervals."""
     jackknife: bool = True
     """Whether to compute block-jackknife standard deviations."""
