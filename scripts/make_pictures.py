@@ -56,7 +56,6 @@ def main(
 
 
 def _result(result: Path, out: Path) -> None:
-    (out / "overview.png").write_bytes((result / "overview.png").read_bytes())
     if EXECUTABLE is None:
         print("no Chromium: report.png and viewer.png are left as they are")
         return

@@ -88,10 +88,11 @@ def save_masks(folder: Path, calibration: Calibration, _view: SurfaceView) -> li
 
 @extra("pictures")
 def save_pictures(folder: Path, calibration: Calibration, view: SurfaceView) -> list[str]:
-    """Write the panels of the overview at full size: maps, residuals, surface, convergence."""
+    """Write ``overview.png``, all at one look, and its panels and others at full size."""
     frames, solution, trace = calibration.frames, calibration.solution, calibration.trace
     scale = trace[-1].scale_px if trace else None
     pictures = {
+        "overview": figures.overview_figure(calibration, view),
         "observed": figures.coordinates_figure(frames, "observed"),
         "rendered": figures.coordinates_figure(frames, "rendered"),
         "residual": figures.residual_figure(frames),

@@ -18,6 +18,7 @@ from ..records.calibration import Calibration, FrameMaps, TraceRow
 from ..records.solution import Solution
 from . import panels
 from .frame_poses import frame_poses
+from .margins import BAR, Margins
 from .solution_values import headline, unit_name
 from .view import SurfaceView
 
@@ -82,7 +83,7 @@ def histogram_figure(
         noise_px: standard deviation of a normal distribution to compare with, pattern pixels.
         scale_px: scale of the robust loss, pattern pixels.
     """
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = Figure(figsize=(7, 4.5), layout=Margins())
     panels.residual_histogram(figure.subplots(), frames, noise_px, scale_px)
     return figure
 
@@ -90,7 +91,7 @@ def histogram_figure(
 def convergence_figure(trace: list[TraceRow]) -> Figure:
     """Draw cost and, where it is one number, focal length against the iteration."""
     with_focal = any(row.focal is not None for row in trace)
-    figure = Figure(figsize=(7, 7 if with_focal else 4), layout="constrained")
+    figure = Figure(figsize=(7, 7 if with_focal else 4), layout=Margins())
     axes = np.atleast_1d(figure.subplots(2 if with_focal else 1, sharex=True))
     panels.trace_cost(axes[0], trace)
     if with_focal:
@@ -123,20 +124,6 @@ def surface_figure(
     return figure
 
 
-def surface_figures(
-    view: SurfaceView, unit: str, error: NDArray[np.float64] | None = None
-) -> list[Figure]:
-    """Draw the panels of :func:`surface_figure` one by one, for a page that places them."""
-    height, width = view.depth.shape
-    size = 0.8 * np.array(_size(width, height, 1, 1))  # keeps text readable
-    figures = []
-    for draw in _surface_panels(view, unit, error):
-        figure = Figure(figsize=(size[0], size[1]), layout="constrained")
-        draw(figure.subplots())
-        figures.append(figure)
-    return figures
-
-
 def _surface_panels(
     view: SurfaceView, unit: str, error: NDArray[np.float64] | None
 ) -> list[Callable[[Axes], None]]:
@@ -150,7 +137,7 @@ def _surface_panels(
 
 def rig_figure(calibration: Calibration, view: SurfaceView) -> Figure:
     """Draw camera, projectors and surface from above."""
-    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    figure = Figure(figsize=(7, 4.5), layout=Margins())
     projectors, unit = projector_poses(calibration.solution), unit_name(calibration.solution)
     panels.rig_section(figure.subplots(), view, calibration.camera, projectors, unit)
     return figure
@@ -168,7 +155,7 @@ def correlation_figure(unknowns: list[str], matrix: list[list[float | None]]) ->
         unknowns, values = strongest(unknowns, values)
         title = "Strongest correlation between unknowns of each group"
     side = max(5.0, _ROW_INCHES * len(unknowns))
-    figure = Figure(figsize=(side + 2, side), layout="constrained")
+    figure = Figure(figsize=(side + 2, side), layout=Margins(right=BAR))
     numbers = len(unknowns) <= _MAX_NUMBERED
     panels.correlation(figure.subplots(), unknowns, values, numbers=numbers, title=title)
     return figure

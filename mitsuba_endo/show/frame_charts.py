@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..records.solution import INTERVAL, Frame, PoseEstimate, Solution
+from .margins import Margins
 from .solution_values import unit_name
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,7 @@ def frame_charts(solution: Solution) -> list[tuple[str, Figure]]:
 
 
 def _fit(solution: Solution) -> Figure:
-    figure = Figure(figsize=(7, 4.6), layout="constrained")
+    figure = Figure(figsize=(7, 4.6), layout=Margins())
     above, below = figure.subplots(2, sharex=True)
     number = np.arange(1, len(solution.frames) + 1)
     above.plot(number, [_number(f.rms_px) for f in solution.frames], "o-", ms=3, color=_AXES[0][1])
@@ -50,7 +51,7 @@ def _fit(solution: Solution) -> Figure:
 def _poses(
     device: str, frames: Sequence[Frame], of: Callable[[Frame], PoseEstimate], unit: str
 ) -> Figure:
-    figure = Figure(figsize=(7, 4.6), layout="constrained")
+    figure = Figure(figsize=(7, 4.6), layout=Margins())
     above, below = figure.subplots(2, sharex=True)
     found = np.array([_six(of(frame)) for frame in frames])
     number = np.arange(1, len(frames) + 1)

@@ -7,14 +7,22 @@ from matplotlib.figure import Figure
 
 from ..evaluate.tracked_frames import TrackedFrames
 from ..records.calibration import Calibration
-from . import figures
+from . import figures, surface_colours
 from .frame_charts import frame_charts
 from .report_content import FOLDED
 from .result_scene import ResultScene
 from .templating import render
 from .track_figure import track_figure
 from .view import SurfaceView, view_surface
-from .web_images import MapImages, figure_image, figure_svg, map_pages, photograph_uri
+from .web_images import (
+    MapImages,
+    ShownImage,
+    depth_image,
+    figure_svg,
+    map_pages,
+    photograph_uri,
+    value_image,
+)
 from .web_scene import scene_canvas, view_error
 
 _CHART_INCHES = 5.2
@@ -71,14 +79,18 @@ def viewer(calibration: Calibration, number: int) -> Markup:
     )  # fmt: skip
 
 
-def surfaces(scene: ResultScene, view: SurfaceView) -> list[Picture]:
+def surfaces(scene: ResultScene, view: SurfaceView) -> list[ShownImage]:
     """Return depth, uncertainty and error of the first surface."""
-    known_truth = scene.truth is not None and scene.truth.surface is not None
-    error = view_error(scene, 0, view) if known_truth else None
-    return [
-        Picture(figure.axes[0].get_title(), figure_image(figure))
-        for figure in figures.surface_figures(view, scene.unit, error)
-    ]
+    images, (height, width) = [depth_image(view, scene.unit)], view.depth.shape
+    if view.std is not None:
+        shown = surface_colours.uncertainty([view.std.ravel()], scene.unit)
+        images.append(value_image(shown, height, width))
+    truth = scene.truth
+    if truth is not None and truth.surface is not None:
+        error = view_error(scene, 0, view).ravel()
+        shown = surface_colours.error([error], scene.unit, truth.alignment)
+        images.append(value_image(shown, height, width))
+    return images
 
 
 def charts(scene: ResultScene, view: SurfaceView) -> list[Picture]:

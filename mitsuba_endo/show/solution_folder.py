@@ -21,7 +21,6 @@ from ..records.rig import Rig
 from ..records.solution import Solution, save_solution
 from ..records.surface import MODES, SURFACE, own_surface_name, save_modes, save_surface
 from ..records.trajectory import save_frames
-from . import figures
 from .extras import EXTRAS, check_extras
 from .map_names import map_names, observed_names
 from .photographs import StoredPhotographs, photograph_path, save_photograph
@@ -62,7 +61,6 @@ def write_solution_folder(
     rig.yaml              the rig with all defaults filled in, if given
     report.html           look at this first: verdict, maps, numbers, provenance; needs no network
     decoded/              copies of the files of the folder ``decoded``, if given
-    overview.png          the same at one look
     ====================  =========================================================================
 
     And, of :data:`.extras.EXTRAS`, the files that ``extras`` names.
@@ -99,7 +97,6 @@ def write_solution_folder(
             save_observed(folder / name, frame)
         if rig is not None:
             save_rig(folder / "rig.yaml", rig)
-        figures.save_figure(folder / "overview.png", figures.overview_figure(calibration, view))
         if decoded is not None:
             shutil.copytree(decoded, folder / DECODED)
         _save_photographs(folder / DECODED, calibration)

@@ -80,15 +80,20 @@ def error(errors: list[Floats], unit: str, alignment: str) -> Shown:
 def depth(vertices: list[Floats], unit: str) -> Shown:
     """Show how far along its camera's axis every vertex (V, 3) lies."""
     values = [v[:, 2] for v in vertices]
-    low, high = np.percentile(np.concatenate(values), [1, 99])
+    known = _known(values)
+    low, high = np.percentile(known, [1, 99]) if len(known) else (0.0, 1.0)
     label = f"depth in the camera, {unit}"
     return Shown("depth", label, values, float(low), float(max(high, low + 1e-9)), DEPTH)
 
 
 def _top(values: list[Floats]) -> float:
-    known = np.concatenate(values)
-    known = known[np.isfinite(known)]
+    known = _known(values)
     return max(float(np.percentile(known, _SHARE)), 1e-12) if len(known) else 1.0
+
+
+def _known(values: list[Floats]) -> Floats:
+    together = np.concatenate(values)
+    return together[np.isfinite(together)]
 
 
 def _number(value: float) -> str:

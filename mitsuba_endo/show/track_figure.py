@@ -12,6 +12,7 @@ from ..evaluate.tracked_frames import TrackedFrames
 from ..geometry.transforms import RigidTransform
 from ..records.solution import INTERVAL, Solution
 from ..records.trajectory import FrameRow
+from .margins import Margins
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ def track_figure(tracked: TrackedFrames) -> Figure:
         (f"projector moved, {unit}", lambda row: _projector_shift(row, first)),
         ("projector turned, degrees", lambda row: _projector_turn(row, first)),
     ]  # fmt: skip
-    figure = Figure(figsize=(7, 10.5), layout="constrained")
+    figure = Figure(figsize=(7, 10.5), layout=Margins())
     drawn = figure.subplots(len(panels) + 1, sharex=True)
     for axes, (title, values) in zip(drawn, panels, strict=False):
         _components(axes, rows, values)

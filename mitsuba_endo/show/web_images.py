@@ -10,13 +10,17 @@ from typing import Any
 import cv2
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..records.calibration import FrameMaps
-from .colours import MISSING, RESIDUAL, UNUSED, banded
+from . import surface_colours
+from .colours import MISSING, RESIDUAL, UNUSED, banded, shaded
 from .panels import coordinate_limits, residual_range
+from .surface_colours import Shown
+from .view import SurfaceView
 
 _PIXELS = 5_000_000
 """Of all maps together: keeps the page below 3 MB whatever the number of frames."""
@@ -24,8 +28,6 @@ _MAX_SIDE = 640
 """Pixels of a map's longer side. Chosen, as is the quality, for pages of few MB."""
 _QUALITY = 85
 """Of WebP, 0 to 100."""
-_FIGURE_DPI = 96
-"""Pixels per inch, as CSS defines its inch."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,15 @@ class MapImages:
     observed: str
     rendered: str
     residual: str
+
+
+@dataclass(frozen=True)
+class ShownImage:
+    """An image of a quantity with its scale."""
+
+    name: str
+    source: str
+    bar: ColourBar
 
 
 @dataclass(frozen=True)
@@ -91,17 +102,27 @@ def figure_svg(figure: Figure) -> str:
     """Return a line drawing as the data URI of an SVG."""
     buffer = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "report"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        # Of the canvas: the figure's own savefig draws everything twice.
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return _data_uri("image/svg+xml", buffer.getvalue())
 
 
-def figure_image(figure: Figure) -> str:
-    """Return a figure that holds images as the data URI of a WebP."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_FIGURE_DPI)
-    image = cv2.imdecode(np.frombuffer(buffer.getvalue(), np.uint8), cv2.IMREAD_COLOR)
-    assert image is not None
-    return _uri(image[..., ::-1].astype(np.float64) / 255, 1.0)
+def depth_image(view: SurfaceView, unit: str) -> ShownImage:
+    """Return the depth of a surface in its camera, shaded to show its relief."""
+    shown = surface_colours.depth([view.points.reshape(-1, 3)], unit)
+    norm = Normalize(shown.low, shown.high)
+    return _shown(shown, shaded(view.depth, view.normals, shown.scale, norm)[..., :3])
+
+
+def value_image(shown: Shown, height: int, width: int) -> ShownImage:
+    """Return the image of a quantity that has a value for every pixel, in rows."""
+    return _shown(shown, shown.rgb(0).reshape(height, width, 3) / 255)
+
+
+def _shown(shown: Shown, image: NDArray[np.float64]) -> ShownImage:
+    norm = Normalize(shown.low, shown.high)
+    bar = _scale(matplotlib.colormaps[shown.scale], norm, shown.label)
+    return ShownImage(shown.name, _uri(image, min(1.0, _MAX_SIDE / max(image.shape))), bar)
 
 
 def photograph_uri(image: NDArray[np.uint8], shrink: float) -> str:

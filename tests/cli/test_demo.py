@@ -47,7 +47,7 @@ def test_demo_leaves_everything_it_names(finished: tuple[Path, dict[str, Any]]):
     for name in (
         "capture/image.png", "capture/truth.json", "input/image.png", "decoded/image.exr",
         "decoded/image_graph.png", "input/rig.yaml",
-        "solution/report.html", "solution/overview.png", "solution/solution.json",
+        "solution/report.html", "solution/solution.json",
         "solution/surface.ply", "metrics.json",
     ):  # fmt: skip
         assert (out / name).stat().st_size > 100, name

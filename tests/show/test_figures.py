@@ -168,8 +168,10 @@ def test_nothing_seen_is_still_drawn(calibration: Calibration, view: SurfaceView
     empty = replace(frame, observed=nothing, rendered=nothing, used=np.zeros_like(frame.used))
     blank = replace(view, points=np.full_like(view.points, np.nan))
     broken = replace(calibration, frames=[empty], trace=[])
-    figures.overview_figure(broken, blank).canvas.draw()
-    figures.convergence_figure([TraceRow(0, 0.0, 0.0, None, 1.0, 1.0, 0.0)]).canvas.draw()
+    figures.overview_figure(broken, blank).draw_without_rendering()
+    figures.convergence_figure(
+        [TraceRow(0, 0.0, 0.0, None, 1.0, 1.0, 0.0)]
+    ).draw_without_rendering()
 
 
 def test_png_is_written_and_no_state_stays(tmp_path: Path, calibration: Calibration):

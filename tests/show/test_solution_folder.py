@@ -64,9 +64,8 @@ def written(tmp_path_factory: pytest.TempPathFactory, calibration: Calibration) 
 
 
 @pytest.fixture
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the pictures, which take a second and are not what these tests look at."""
-    monkeypatch.setattr(solution_folder.figures, "save_figure", lambda *_: None)
+def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the report, which takes a second and is not what these tests look at."""
     monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
 
 
@@ -152,7 +151,7 @@ def test_frames_left_out_are_rows_too(calibration: Calibration):
 def test_nothing_extra_unless_asked(tmp_path: Path, calibration: Calibration):
     """Oracle: the list in the documentation; an unknown name is refused before anything is."""
     write_solution_folder(tmp_path / "out", calibration)
-    assert {p.name for p in (tmp_path / "out").iterdir()} == FILES | {"overview.png"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == FILES
     with pytest.raises(InputError, match="extras: 'deep' is unknown; choose from depth"):
         write_solution_folder(tmp_path / "no", calibration, extras=["deep"])
     assert not (tmp_path / "no").exists()
@@ -206,7 +205,7 @@ def test_scene_renders_as_it_is(written: Path):
 def test_wide_angle_scene_renders_the_same_coordinates(
     tmp_path: Path,
     calibration: Calibration,
-    no_pictures: None,
+    no_report: None,
     model: str,
     coefficients: tuple[float, ...],
 ):
@@ -251,7 +250,7 @@ def _with_frame(calibration: Calibration, **changes: Any) -> Calibration:
     return replace(calibration, solution=solution.model_copy(update={"frames": frames}))
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_report")
 @pytest.mark.parametrize("what", ["intrinsics", "pose"])
 def test_no_scene_without_its_values(tmp_path: Path, calibration: Calibration, what: str):
     """Oracle: no scene.xml, null in solution.json, and a warning that names what is missing."""
@@ -273,11 +272,12 @@ def test_unknown_values_do_not_stop_the_pictures(tmp_path: Path, calibration: Ca
     """Oracle: all pictures are there although focal length and pose are null."""
     changed = _with_focal(calibration, Estimate(value=None, **UNKNOWN))
     unknown = PoseEstimate(R=None, t=None, **UNKNOWN)
-    write_solution_folder(tmp_path / "out", _with_frame(changed, projector_from_camera=unknown))
-    assert {p.name for p in (tmp_path / "out").iterdir()} >= {"overview.png", "report.html"}
+    changed = _with_frame(changed, projector_from_camera=unknown)
+    write_solution_folder(tmp_path / "out", changed, extras=["pictures"])
+    assert {p.name for p in (tmp_path / "out").iterdir()} >= PICTURES | {"report.html"}
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_report")
 def test_focal_per_frame_goes_into_the_scene(tmp_path: Path, calibration: Calibration):
     """Oracle: projector coordinates scale about the centre with the first frame's own focal."""
     own = Estimate(value=450.0, status="measured")
@@ -290,7 +290,7 @@ def test_focal_per_frame_goes_into_the_scene(tmp_path: Path, calibration: Calibr
     )
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_report")
 def test_several_frames(tmp_path: Path, make_calibration: Maker):
     """Oracle: one map a frame, names made safe for a file system, none twice."""
     calibration = make_calibration(**SIZE, count=3)
@@ -301,7 +301,7 @@ def test_several_frames(tmp_path: Path, make_calibration: Maker):
         np.testing.assert_array_equal(load_map(tmp_path / "out" / name).q, frame.rendered)
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_report")
 def test_rig_is_saved_with_its_defaults(tmp_path: Path, calibration: Calibration):
     """Oracle: the rig itself, read back; the pattern's size is taken from it where missing."""
     rig = Rig.model_validate(
@@ -327,7 +327,6 @@ def test_interrupted_leaves_the_old_or_nothing(
 ):
     """Oracle: the folder's content before Ctrl-C fell into the drawing of the pictures."""
     out = tmp_path / "out"
-    monkeypatch.setattr(solution_folder.figures, "save_figure", lambda *_: None)
     monkeypatch.setattr(solution_folder, "save_report", lambda *_: None)
     if existing:
         write_solution_folder(out, calibration)
@@ -336,7 +335,7 @@ def test_interrupted_leaves_the_old_or_nothing(
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(solution_folder.figures, "save_figure", interrupt)
+    monkeypatch.setattr(solution_folder, "save_report", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_solution_folder(out, calibration)
     assert sorted(str(p) for p in tmp_path.rglob("*")) == before
