@@ -172,13 +172,12 @@ def decode_images(
             no pattern found in any image, or as :func:`decode_into`.
     """
     from ..decoding.image_files import is_images
-    from ..decoding.stack_map import KINDS
     from ..errors import InputError
     from ..records.rig import load_rig
     from .stack_frames import decode_stacks
 
     images = [path for path in paths if is_images(path)]
-    if pattern in KINDS and images:
+    if images and _is_stack(pattern):
         if not refine:
             raise InputError("is for images of the coded grid", "--no-refine", "leave it out")
         if map_convention:
@@ -199,6 +198,15 @@ def decode_images(
     refuse_nothing(found)
     output.print(*(one.line() for one in found))
     return [map_path(aside, one.name) for one in found if not one.reason]
+
+
+def _is_stack(pattern: str | None) -> bool:
+    """Tell whether the name of a pattern is that of a stack of photographs."""
+    if pattern is None:
+        return False
+    from ..decoding.stack_map import KINDS
+
+    return pattern in KINDS
 
 
 def refuse_nothing(found: Sequence[Summary]) -> None:

@@ -19,7 +19,6 @@ from .frames.initial_poses import (
     without_repeats,
 )
 from .frames.joint import at_identity, extended, joint_problem, seen_from_first
-from .frames.joint_mesh import joint_mesh_problem
 from .frames.restart import with_restarts
 from .frames.resume import resumed_maps, resumed_problem
 from .frames.separate_surfaces import separate_surfaces
@@ -219,6 +218,8 @@ def _joint_problem(
     """Build the joint problem on the kind of surface that the options ask for."""
     layout = job.layout(len(alone))
     if job.options.surface == "mesh":
+        from .frames.joint_mesh import joint_mesh_problem  # takes a tenth of a second to load
+
         return joint_mesh_problem(alone, registered, job.camera, job.rig, layout, job.law)
     return joint_problem(alone, registered, job.rig, layout, job.law)
 
