@@ -16,7 +16,7 @@ import typer
 from numpy.typing import NDArray
 
 from mitsuba_endo import backend
-from mitsuba_endo.evaluate.trajectory import absolute_trajectory_error, trajectory_alignment
+from mitsuba_endo.evaluate.trajectory_errors import absolute_trajectory_error, trajectory_alignment
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.initialisation.range_image import RangeImage
 from mitsuba_endo.initialisation.registration import register_frames

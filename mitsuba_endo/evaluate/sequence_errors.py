@@ -13,7 +13,7 @@ from .poses import focal_error
 from .sequence_metrics import SequenceMetrics
 from .sequence_surface import TrackedViews
 from .tracked_frames import PosePairs, TrackedFrames
-from .trajectory import absolute_trajectory_error, trajectory_alignment
+from .trajectory_errors import absolute_trajectory_error, trajectory_alignment
 
 
 def evaluate_sequence(

@@ -17,7 +17,7 @@ from .distance import distance_to_mesh
 from .metric_value import root_mean_square
 from .sequence_metrics import FrameDepth
 from .tracked_frames import PosePairs, TrackedFrames
-from .trajectory import trajectory_alignment
+from .trajectory_errors import trajectory_alignment
 
 if TYPE_CHECKING:
     from ..rendering.synthetic import MeshScene

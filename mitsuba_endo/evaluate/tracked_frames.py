@@ -14,7 +14,7 @@ from ..records.solution import INTERVAL, Solution
 from ..records.trajectory import FrameRow
 from .alignment import Similarity
 from .metric_value import root_mean_square
-from .trajectory import absolute_trajectory_error, relative_pose_error, trajectory_alignment
+from .trajectory_errors import absolute_trajectory_error, relative_pose_error, trajectory_alignment
 
 APART = 10
 """Frames over which motions are compared."""

@@ -1,6 +1,6 @@
-"""Lens distortion of normalised image coordinates, after OpenCV.
+"""Brown's lens distortion of normalised image coordinates, after OpenCV.
 
-Both models map ideal normalised coordinates to distorted ones; ``remove`` is the exact inverse.
+``apply`` maps ideal normalised coordinates to distorted ones; ``remove`` is the exact inverse.
 Coefficients may be floats or Dr.Jit scalars, and both directions are differentiable with respect
 to the coordinates and the coefficients.
 """
@@ -111,41 +111,3 @@ class BrownDistortion:
 
     def _padded(self) -> list[Array]:
         return [*self.coefficients, *[0.0] * (8 - len(self.coefficients))]
-
-
-@dataclass(frozen=True, eq=False)
-class FisheyeDistortion:
-    """OpenCV fisheye: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
-
-    theta is the angle to the optical axis and theta_d the distance of the normalised image point
-    from the centre. Source: OpenCV, module ``fisheye``.
-    """
-
-    coefficients: Sequence[Array] = ()
-    """Up to 4 values k1..k4; missing ones are zero."""
-
-    def apply(self, theta: Array) -> Array:
-        """Return theta_d."""
-        k1, k2, k3, k4 = self._padded()
-        t2 = theta * theta
-        return theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
-
-    def remove(self, theta_d: Array) -> Array:
-        """Return theta, by Newton's method (differentiable as in :class:`BrownDistortion`)."""
-        xp = namespace(theta_d, *self.coefficients)
-        frozen = FisheyeDistortion([xp.detach(c) for c in self.coefficients])
-        target = xp.detach(theta_d)
-        theta = target
-        for _ in range(_FIXED_POINT_STEPS + _NEWTON_STEPS):
-            theta = theta - (frozen.apply(theta) - target) / frozen.slope(theta)
-        theta = xp.detach(theta)
-        return theta - (self.apply(theta) - theta_d) / frozen.slope(theta)
-
-    def slope(self, theta: Array) -> Array:
-        """Return d theta_d / d theta."""
-        k1, k2, k3, k4 = self._padded()
-        t2 = theta * theta
-        return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
-
-    def _padded(self) -> list[Array]:
-        return [*self.coefficients, *[0.0] * (4 - len(self.coefficients))]

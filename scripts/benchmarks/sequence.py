@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from mitsuba_endo.evaluate.distance import distance_to_mesh
 from mitsuba_endo.evaluate.metric_value import root_mean_square
-from mitsuba_endo.evaluate.trajectory import (
+from mitsuba_endo.evaluate.trajectory_errors import (
     absolute_trajectory_error,
     relative_pose_error,
     trajectory_alignment,

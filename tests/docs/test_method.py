@@ -70,7 +70,14 @@ TERMS = {
     "normal_equations": "$J^T W J$", "schur": r"(G - B^T A^{-1} B)", "cholesky": "banded Cholesky",
     "damping": "damping", "adam": "step of Adam", "ransac": "five-point RANSAC",
     "epipolar_residual": r"\partial e/\partial q", "triangulat": "range from two rays",
-    "icp": "point-to-plane", "sandwich": "simulation extrapolation", "jackknife": "jackknife",
+    "icp": "point-to-plane", "kannala_brandt": "Kannala and Brandt",
+    "levenberg_marquardt": r"\mathrm{diag} H", "score_test": "score tests",
+    "nuisance": r"S (Q + m m^T) S^T", "structure": "structure of residuals",
+    "design_effect": "design effect", "phase_shift": "phase shifting",
+    "heterodyne": "none of which spans", "gray_code": "Gray code", "gap_code": "gap code",
+    "regression": "image refinement", "epipolar_focal": "$f$ from", "cluster_cov": "as clusters",
+    "trajectory_err": "trajectory errors", "alignment": "trajectory errors",
+    "sandwich": "simulation extrapolation", "jackknife": "jackknife",
 }  # fmt: skip
 """Words that a textbook uses for what a row of the table computes."""
 

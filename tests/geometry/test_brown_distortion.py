@@ -1,9 +1,9 @@
-"""Lens distortion at its extremes."""
+"""Brown's distortion at its extremes."""
 
 import numpy as np
 import pytest
 
-from mitsuba_endo.geometry.brown_distortion import BrownDistortion, FisheyeDistortion
+from mitsuba_endo.geometry.brown_distortion import BrownDistortion
 
 
 @pytest.mark.parametrize(
@@ -27,10 +27,3 @@ def test_jacobian() -> None:
     dy = (np.array(brown.apply(x, y + step)) - np.array(brown.apply(x, y - step))) / (2 * step)
     np.testing.assert_allclose(brown.jacobian(x, y), [dx[0], dx[1], dy[1]], atol=1e-8)
     np.testing.assert_allclose(dx[1], dy[0], atol=1e-8)
-
-
-def test_fisheye_is_removed_exactly_beyond_90_degrees() -> None:
-    """Oracle: the identity up to 115 degrees off the axis."""
-    fisheye = FisheyeDistortion((0.02, -0.01, 0.004, -0.0006))
-    theta = np.linspace(0, 2.0, 41)
-    np.testing.assert_allclose(fisheye.remove(fisheye.apply(theta)), theta, atol=1e-10)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mitsuba_endo.evaluate.distance import distance_to_mesh
-from mitsuba_endo.evaluate.trajectory import absolute_trajectory_error, trajectory_alignment
+from mitsuba_endo.evaluate.trajectory_errors import absolute_trajectory_error, trajectory_alignment
 from mitsuba_endo.sequence.outcome import SequenceResult
 from mitsuba_endo.sequence.run import Recorded
 from tests.lumen import FOCAL

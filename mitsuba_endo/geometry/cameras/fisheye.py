@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from ..arrays import Array, namespace
-from ..brown_distortion import FisheyeDistortion
+from ..kannala_brandt_distortion import KannalaBrandtDistortion
 from .registry import register_camera
 
 
@@ -23,7 +23,7 @@ class OpenCVFisheye:
         r2 = x * x + y * y
         off_axis = r2 > 0
         r = xp.sqrt(xp.where(off_axis, r2, 1.0))
-        theta_d = FisheyeDistortion(coefficients).apply(xp.atan2(r, z))
+        theta_d = KannalaBrandtDistortion(coefficients).apply(xp.atan2(r, z))
         scale = xp.where(off_axis, theta_d / r, 1 / xp.where(off_axis, 1.0, z))
         return scale * x, scale * y
 
@@ -34,7 +34,7 @@ class OpenCVFisheye:
         r2 = a * a + b * b
         off_axis = r2 > 0
         theta_d = xp.sqrt(xp.where(off_axis, r2, 1.0))
-        theta = FisheyeDistortion(coefficients).remove(theta_d)
+        theta = KannalaBrandtDistortion(coefficients).remove(theta_d)
         scale = xp.where(off_axis, xp.sin(theta) / theta_d, 1.0)
         return scale * a, scale * b, xp.where(off_axis, xp.cos(theta), 1.0)
 
@@ -47,9 +47,9 @@ class OpenCVFisheye:
         off_axis = r2 > 0
         r = xp.sqrt(xp.where(off_axis, r2, 1.0))
         theta = xp.atan2(r, z)
-        fisheye = FisheyeDistortion(coefficients)
-        slope = fisheye.slope(theta)
-        area = fisheye.apply(theta) * slope * xp.sqrt(r2 + z * z) / r
+        distortion = KannalaBrandtDistortion(coefficients)
+        slope = distortion.slope(theta)
+        area = distortion.apply(theta) * slope * xp.sqrt(r2 + z * z) / r
         return xp.where(off_axis, area, 1.0), xp.where(off_axis, slope > 0, z > 0)
 
     def projectable(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ..linearise import Poses
-from .covariance import Covariance, covariance, curvature_weights, scatter
+from .cluster_covariance import Covariance, covariance, curvature_weights, scatter
 from .equations import FRAME, Equations, Weights, equations
 from .observations import AdjustedFrame, Elements, Seen, observe
 from .priors import Plan, drift_equations, gauge

@@ -15,7 +15,7 @@ from ..linearise import Poses, orthonormal
 from ..placement import Prior
 from ..projector_prior import ProjectorDrift
 from .adjust import Adjusted
-from .covariance import curvature_weights
+from .cluster_covariance import curvature_weights
 from .equations import FRAME, Weights
 from .observations import AdjustedFrame, Seen, observe
 

@@ -1,4 +1,10 @@
-"""Levenberg-Marquardt on the rendered projector coordinates."""
+"""Levenberg-Marquardt on the rendered projector coordinates.
+
+A step solves (H + mu diag H) delta = -g, with H = J^T W J and g = J^T W r over all unknowns and mu
+from :mod:`.damping`. H is never formed whole: :meth:`.NormalEquations.solve` eliminates the
+surfaces, :func:`..elimination.schur_complement.solve_step` solves what is left and substitutes
+back. Source: Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963.
+"""
 
 import time
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A triangle mesh as the surface: X_i = X0_i + d_i n_i along fixed directions n_i.
+"""A triangle mesh as the surface: X_i = X0_i + s_i n_i along fixed directions n_i.
 
 It represents what no function of the direction from one camera can: the far side of folds, a whole
 organ. Vertices are numbered by SciPy's reverse Cuthill-McKee order, which makes the normal matrix
@@ -75,14 +75,14 @@ class TriangleMesh(Surface):
     def bending(self, disparity: float) -> Bending:
         """Return bends across edges, of the disparity that a motion along n changes.
 
-        A vertex at distance r has the disparity f b / r; moving by d along n changes it by about
-        f b d / r^2, whichever way n points.
+        A vertex at distance r has the disparity f b / r; moving by s along n changes it by about
+        f b s / r^2, whichever way n points.
         """
         rows, corners = bending_operator(self.anchors, self.faces)
         scale = disparity / self.distances[corners].mean(1) ** 2
         rows = sp.diags_array(scale) @ rows
         normals = self._edge_normals(corners)
-        # Along the edge's own normal: K (X0 + d n) . m = (K X0) . m + sum_i K_i (n_i . m) d_i.
+        # Along the edge's own normal: K (X0 + s n) . m = (K X0) . m + sum_i K_i (n_i . m) s_i.
         offset = np.einsum("ec,ec->e", rows @ self.anchors, normals)
         coo = sp.coo_array(rows)
         edge, vertex = coo.coords

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.evaluate.trajectory import (
+from mitsuba_endo.evaluate.trajectory_errors import (
     absolute_trajectory_error,
     relative_pose_error,
     trajectory_alignment,
