@@ -22,7 +22,7 @@ made from, and writes this page; `tests/docs/test_inputs.py` does the same again
 wrong answer without a word. The words of `--map-convention` are explained in
 [Conventions](conventions.md#maps-of-other-tools), those of stacks in
 [Commands](commands.md#stacks-of-other-people), the formats of camera files in
-[The rig file](rig.md#camera).
+[The rig file](rig.md#camera). `sequence` reads maps, masks and images in the same way.
 """
 
 

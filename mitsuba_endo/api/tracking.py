@@ -14,10 +14,11 @@ from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.solution import Solution
 from ..records.trajectory import FrameRow
+from ..sequence.frame_reading import FrameReading
 from ..sequence.inputs import Feed, feed_of_maps, frames_of
 from ..sequence.options import SequenceOptions
 from ..sequence.outcome import SequenceResult, outcome_of
-from ..sequence.resume import Decoding, Past, load_state, save_state
+from ..sequence.resume import Past, load_state, save_state
 from ..sequence.run import Run, run_sequence
 from ..show.sequence_folder import write_sequence_folder
 from ..show.sequence_views import SequenceViews
@@ -33,6 +34,8 @@ def track(
     *,
     pattern: str | None = None,
     refine: bool = True,
+    map_convention: str = "",
+    mask: str | Path | None = None,
     resume: str | Path | None = None,
     on_frame: Callable[[FrameRow], None] | None = None,
     options: SequenceOptions | None = None,
@@ -48,6 +51,8 @@ def track(
         rig: what is known: a rig file's path, its contents, or its record.
         pattern: in the images; default the coded grid.
         refine: whether decoded coordinates are refined on their images.
+        map_convention: of files and arrays, the command's ``--map-convention``; records are right.
+        mask: image whose white pixels are used, for all frames, or a folder of one per frame.
         resume: folder of an earlier sequence to go on with; the captures begin with its frames.
         on_frame: called with every frame once it is placed or lost.
         options: how to go through the frames.
@@ -58,40 +63,41 @@ def track(
     backend.ensure()
     record, options = as_rig(rig), options or SequenceOptions()
     past = None if resume is None else load_state(resume)
-    decoding = Decoding(pattern, refine)
-    feed = _feed(captures, record, decoding, past)
+    reading = FrameReading(pattern, refine, map_convention, None if mask is None else str(mask))
+    feed = _feed(captures, record, reading, past)
     run = past and past.go_on(record, options, on_frame)
     last = _LastRun()
     recorded = run_sequence(feed, record, options, on_frame, run=run, keeper=last)
 
     def state(path: Path) -> None:
-        save_state(path, last.run, feed.marks[: last.run.taken], decoding)
+        save_state(path, last.run, feed.marks[: last.run.taken], reading)
 
     return TrackedSequence(outcome_of(recorded, options.vertices), state)
 
 
 def _feed(
-    captures: FrameInput | Iterable[FrameInput], rig: Rig, decoding: Decoding, past: Past | None
+    captures: FrameInput | Iterable[FrameInput], rig: Rig, reading: FrameReading, past: Past | None
 ) -> Feed:
     """Return the frames of files, or of arrays as they come."""
     if isinstance(captures, str | Path | CorrespondenceMap | np.ndarray | list | tuple):
         captures = as_frames(captures)
         paths = [Path(c) for c in captures if isinstance(c, str | Path)]
         if paths and len(paths) == len(captures):
-            return frames_of(
-                paths, rig, pattern=decoding.pattern, refine=decoding.refine, past=past
-            )
-    if decoding != Decoding():
+            return frames_of(paths, rig, reading=reading, past=past)
+    if (reading.pattern, reading.refine) != (None, True):
         raise InputError("is for files of images, and maps are given", "pattern", "leave it out")
-    return feed_of_maps(_maps(captures, rig), past)
+    reading.check(rig, maps=True)
+    return feed_of_maps(_maps(captures, rig, reading.map_convention), reading, past)
 
 
-def _maps(captures: Iterable[FrameInput], rig: Rig) -> Iterator[CorrespondenceMap]:
+def _maps(
+    captures: Iterable[FrameInput], rig: Rig, map_convention: str
+) -> Iterator[CorrespondenceMap]:
     for k, capture in enumerate(captures):
         if isinstance(capture, str | Path):
             what = "is a path among maps"
             raise InputError(what, f"captures[{k}]", "give paths alone or maps alone")
-        (map_,) = as_correspondences([capture], rig, None, True)
+        (map_,) = as_correspondences([capture], rig, None, True, map_convention)
         own = isinstance(capture, CorrespondenceMap)
         yield map_ if own else CorrespondenceMap(map_.q, f"frame_{k}")
 

@@ -12,6 +12,7 @@ from .calibrate import Pattern
 from .console import EXIT_FAULT, EXIT_INTERRUPTED, Debug, Json, Quiet, Session, session
 from .decode import Refine
 from .live import watching_sequence
+from .map_options import MapConvention, Mask
 from .options import names_in
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ def sequence(
     voxel: Voxel = None,
     pattern: Pattern = None,
     refine: Refine = True,
+    map_convention: MapConvention = "",
+    mask: Mask = None,
     resume: Resume = None,
     live: Live = False,
     save: Save = "",
@@ -83,20 +86,22 @@ def sequence(
     """
     with session(quiet, as_json, debug) as output:
         from ..records.rig import read_rig
+        from ..sequence.frame_reading import FrameReading
         from ..sequence.inputs import Chosen, frames_of
         from ..sequence.options import SequenceOptions
-        from ..sequence.resume import Decoding, load_state
+        from ..sequence.resume import load_state
         from ..show.unfinished_folder import UnfinishedFolder
 
         kinds = _kinds(save)
-        _prepare(out, resume, [*frames, rig])
+        _prepare(out, resume, [*frames, rig, *([mask] if mask else [])])
         record, notes = read_rig(rig)
         if notes:
             output.print(*notes)
         past = None if resume is None else load_state(resume)
         chosen = Chosen(start, end, stride)
-        feed = frames_of(frames, record, chosen, pattern, refine=refine, past=past)
-        keeper = UnfinishedFolder(out, feed.marks, Decoding(pattern, refine))
+        reading = FrameReading(pattern, refine, map_convention, str(mask) if mask else None)
+        feed = frames_of(frames, record, chosen, reading, past=past)
+        keeper = UnfinishedFolder(out, feed.marks, reading)
         options = SequenceOptions(voxel=voxel)
         with watching_sequence(live, record, output) as watch:
             seen = [watch.view] if watch else []

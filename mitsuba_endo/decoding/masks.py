@@ -57,7 +57,7 @@ class Masks:
             what = "several masks" if found else "no mask"
             todo = f"name one {Path(frame).with_suffix('.png')}, or give one for all frames"
             raise InputError(f"holds {what} of frame {frame}", str(self.path), todo)
-        return read_mask(found[0])
+        return read_mask(found[0], one_of_many=True)
 
     def applied(self, map_: CorrespondenceMap) -> CorrespondenceMap:
         """Return a map without the pixels that its mask leaves out.
@@ -82,14 +82,20 @@ def check_mask(used: NDArray[np.bool_], shape: Sequence[int], source: str) -> No
         raise InputError(what, source, "give it at the frame's size")
 
 
-def read_mask(path: Path) -> NDArray[np.bool_]:
+def read_mask(path: Path, *, one_of_many: bool = False) -> NDArray[np.bool_]:
     """Read the pixels (H, W) to use: those brighter than half of the brightest.
+
+    Args:
+        path: an image.
+        one_of_many: whether it is of one frame, which may be white all over where no tool is seen.
 
     Raises:
         InputError: it cannot be read, is as gray as a photograph, or leaves no pixel or all.
     """
     light = read_image(path).max(-1).astype(np.float32)
     dark, bright = float(light.min()), float(light.max())
+    if one_of_many and dark == bright > 0:
+        return np.ones(light.shape, bool)
     if dark == bright:
         raise InputError("leaves out no pixel or all", str(path), "draw what to use in white")
     between = (light - dark) / (bright - dark)

@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..decoding.image_files import ImageFrame, images_of, is_images, read_frames
+from ..decoding.frame_files import frame_files, is_map
+from ..decoding.image_files import ImageFrame, is_images, read_frames
 from ..errors import InputError
 from ..reading.regular import MAP, read_bytes, regular
-from ..records.correspondence import SUFFIXES as MAPS
 from ..records.correspondence import CorrespondenceMap, frame_names, load_map
 from ..records.rig import Rig
 from ..refine.image_decoder import ImageDecoder
+from .frame_reading import AS_IT_IS, FrameReading
 from .frames import Incoming, PicturedMap, Unread
-from .resume import Decoding, Past
+from .resume import Past
 
 
 @dataclass(frozen=True)
@@ -103,104 +104,114 @@ def frames_of(
     paths: Sequence[Path],
     rig: Rig,
     chosen: Chosen = ALL,
-    pattern: str | None = None,
+    reading: FrameReading = AS_IT_IS,
     *,
-    refine: bool = True,
     past: Past | None = None,
 ) -> Feed:
     """Return the frames of files.
 
-    What is no map, or shows no pattern, is a frame without a map and says why.
+    What is no map, shows no pattern or has no mask is a frame without a map and says why.
 
     Args:
         paths: correspondence maps, or images of the coded grid and videos; folders of either.
         rig: size of image and pattern.
         chosen: which frames.
-        pattern: in the images; None: the default one.
-        refine: whether decoded coordinates are refined on the image.
+        reading: what is said of the files.
         past: an earlier run, whose frames are the first ones and are not read again.
 
     Raises:
-        InputError: a file is missing, maps and images at once, options for images with maps, no
-            frame is left, or the earlier run decoded otherwise.
+        InputError: a file is missing, maps and images at once, options for images with maps or for
+            maps with images, a mask of another size, no frame is left, or the earlier run read
+            otherwise.
     """
-    files = [file for path in paths for file in _inside(path)]
-    maps = [file for file in files if file.suffix.lower() in MAPS]
+    files = frame_files([_known(path) for path in paths])
+    maps = [file for file in files if is_map(file)]
     if maps and len(maps) < len(files):
         raise InputError("maps and images are given", str(maps[0]), "give one kind")
+    reading.check(rig, maps=bool(maps))
     if past is not None:
-        past.check_decoding(Decoding(pattern, refine))
+        past.check_reading(reading)
     marks, where = (past.marks, past.where) if past else ([], "")
     if not maps:
         images = islice(read_frames(files), chosen.start, chosen.end, chosen.stride)
-        return Feed(_decoded(images, rig, pattern, refine), None, marks, where)
-    for name, given in (("--pattern", pattern is not None), ("--no-refine", not refine)):
-        if given:
-            raise InputError("is for images, and maps are given", name, "leave it out")
+        return Feed(_decoded(images, rig, reading), None, marks, where)
     for file in maps:
         regular(file, MAP)
     used = maps[chosen.start : chosen.end : chosen.stride]
     if not used:
         raise InputError(f"of {len(maps)} frames none is left", "--start", "choose an earlier one")
-    return Feed(_loaded(used), len(used), marks, where)
+    return Feed(_loaded(used, rig, reading), len(used), marks, where)
 
 
-def feed_of_maps(maps: Iterable[CorrespondenceMap], past: Past | None = None) -> Feed:
-    """Return maps as the frames of a sequence; ``past`` as in :func:`frames_of`."""
+def feed_of_maps(
+    maps: Iterable[CorrespondenceMap],
+    reading: FrameReading = AS_IT_IS,
+    past: Past | None = None,
+) -> Feed:
+    """Return maps as the frames of a sequence; of ``reading`` its mask, ``past`` as above."""
 
     def arriving() -> Iterator[Arrival]:
         for map_ in maps:
             digest = digest_of(np.ascontiguousarray(map_.q).data)
-            yield Arrival(map_.name, digest, partial(lambda given: given, map_))
+            yield Arrival(map_.name, digest, partial(_masked, map_, reading))
 
+    if past is not None:
+        past.check_reading(reading)
     marks, where = (past.marks, past.where) if past else ([], "")
     return Feed(arriving(), len(maps) if isinstance(maps, Sequence) else None, marks, where)
 
 
-def _inside(path: Path) -> list[Path]:
-    """Return the maps of a folder, or else its images; of anything else itself."""
-    if not path.is_dir():
-        if not is_images(path) and path.suffix.lower() not in MAPS:
-            raise InputError(
-                f"unknown kind of file '{path.suffix}'", str(path), "give maps, images or videos"
-            )
-        return [path]
-    has_maps = any(p.suffix.lower() in MAPS for p in path.iterdir())
-    return images_of(path, MAPS) if has_maps else [path]
+def _known(path: Path) -> Path:
+    """Refuse what is neither a map nor images, by its name."""
+    if not is_images(path) and not is_map(path):
+        raise InputError(
+            f"unknown kind of file '{path.suffix}'", str(path), "give maps, images or videos"
+        )
+    return path
 
 
-def _loaded(files: Sequence[Path]) -> Iterator[Arrival]:
+def _loaded(files: Sequence[Path], rig: Rig, reading: FrameReading) -> Iterator[Arrival]:
     for file, name in zip(files, frame_names(files), strict=True):
         try:
             digest = digest_of(read_bytes(file, MAP))
         except InputError as error:
             digest = error.what  # and the frame will say it
-        yield Arrival(name, digest, partial(_map, file, name))
+        yield Arrival(name, digest, partial(_map, file, name, rig, reading))
 
 
-def _map(file: Path, name: str) -> Incoming:
+def _map(file: Path, name: str, rig: Rig, reading: FrameReading) -> Incoming:
+    size = rig.projector.width, rig.projector.height
     try:
-        return replace(load_map(file), name=name)
+        map_ = replace(load_map(file, reading.convention, size), name=name)
     except InputError as error:
-        return Unread(name, error.what)
+        return Unread(name, error.what, error.todo)
+    return _masked(map_, reading)
 
 
-def _decoded(
-    images: Iterator[ImageFrame], rig: Rig, pattern: str | None, refine: bool
-) -> Iterator[Arrival]:
-    decoder = ImageDecoder(rig, pattern, refine=refine)
+def _masked(map_: CorrespondenceMap, reading: FrameReading) -> Incoming:
+    masks = reading.masks
+    if masks is None:
+        return map_
+    try:
+        return masks.applied(map_)
+    except InputError as error:
+        return Unread(map_.name, f"{error.where} {error.what}", error.todo)
+
+
+def _decoded(images: Iterator[ImageFrame], rig: Rig, reading: FrameReading) -> Iterator[Arrival]:
+    decoder = ImageDecoder(rig, reading.pattern, refine=reading.refine)
     for image in images:
         pixels = np.ascontiguousarray(image.image).data
-        yield Arrival(image.name, digest_of(pixels), partial(_read, decoder, image))
+        yield Arrival(image.name, digest_of(pixels), partial(_read, decoder, image, reading))
 
 
-def _read(decoder: ImageDecoder, image: ImageFrame) -> Incoming:
+def _read(decoder: ImageDecoder, image: ImageFrame, reading: FrameReading) -> Incoming:
     decoded = decoder.decode(image)
     if decoded.grid.reason:
         return Unread(image.name, decoded.grid.reason)
     found = decoded.map.map
     values = {field.name: getattr(found, field.name) for field in fields(found)}
-    return PicturedMap(**values, picture=_picture(image))
+    return _masked(PicturedMap(**values, picture=_picture(image)), reading)
 
 
 def _picture(image: ImageFrame) -> NDArray[np.uint8]:

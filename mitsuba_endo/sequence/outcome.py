@@ -119,7 +119,7 @@ def _solution(recorded: Recorded, beginning: Beginning, finished: Finished) -> S
         "left_out": lost,
         "alternatives": [],
         "verdict": told(rows, [p is not None for p in finished.parts], projector.focal),
-        "warnings": focal_warning(beginning.told, recorded.told),
+        "warnings": [*recorded.findings.values(), *focal_warning(beginning.told, recorded.told)],
         "noise_px": float(np.median(noise)) if noise else alone.noise_px,
         "model": {},
         "observability": {},

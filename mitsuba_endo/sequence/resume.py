@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..reading.regular import is_file
 from ..records.object_file import load_objects, save_objects
 from ..records.rig import Rig
+from .frame_reading import FrameReading
 from .options import SequenceOptions
 from .run import OnFrame, Recorded, Run
 
@@ -19,14 +20,6 @@ _WHAT = "state of a sequence of this version"
 _TODO = "go through the sequence anew without --resume"
 
 
-@dataclass(frozen=True)
-class Decoding:
-    """How maps come from images; the same for all frames of a sequence."""
-
-    pattern: str | None = None
-    refine: bool = True
-
-
 @dataclass(frozen=True, eq=False)
 class Past:
     """What an earlier run left."""
@@ -34,7 +27,7 @@ class Past:
     state: dict[str, Any]
     marks: list[str]
     """What tells each of its frames from others, see :class:`.inputs.Feed`."""
-    decoding: Decoding
+    reading: FrameReading
     where: str
 
     def go_on(self, rig: Rig, options: SequenceOptions, on_frame: OnFrame | None = None) -> Run:
@@ -52,34 +45,36 @@ class Past:
                 raise self._differs(f"was with {field.name} {was}, not {is_}", f"give {was} again")
         return Run.resumed(self.state | {"_options": options}, on_frame)
 
-    def check_decoding(self, decoding: Decoding) -> None:
-        """Refuse another way from images to maps.
+    def check_reading(self, reading: FrameReading) -> None:
+        """Refuse another way from files to maps.
 
         Raises:
             InputError: names the option.
         """
-        for name in ("pattern", "refine"):
-            was, is_ = getattr(self.decoding, name), getattr(decoding, name)
+        for field in fields(reading):
+            was, is_ = (getattr(r, field.name) for r in (self.reading, reading))
             if was != is_:
-                raise self._differs(f"was with {name} {was}, not {is_}", "give the same option")
+                raise self._differs(
+                    f"was with {field.name} {was}, not {is_}", "give the same option"
+                )
 
     def _differs(self, how: str, todo: str) -> InputError:
         return InputError(f"the sequence to go on with {how}", self.where, f"{todo} or start anew")
 
 
-def save_state(path: str | Path, run: Run, marks: Sequence[str], decoding: Decoding) -> None:
+def save_state(path: str | Path, run: Run, marks: Sequence[str], reading: FrameReading) -> None:
     """Write the state of a run.
 
     Args:
         path: the file.
         run: between two frames.
         marks: of its frames so far.
-        decoding: how they were decoded.
+        reading: how they were read.
 
     Raises:
         InputError: the file cannot be written.
     """
-    save_objects(path, {"state": run.state(), "marks": list(marks), "decoding": decoding})
+    save_objects(path, {"state": run.state(), "marks": list(marks), "reading": reading})
 
 
 def load_state(folder: str | Path) -> Past:
@@ -99,7 +94,7 @@ def load_state(folder: str | Path) -> Past:
     found = load_objects(path, _WHAT, _TODO)
     if not _is_state(found):
         raise InputError(f"is not a readable {_WHAT}", str(path), _TODO)
-    return Past(found["state"], found["marks"], found["decoding"], str(path))
+    return Past(found["state"], found["marks"], found["reading"], str(path))
 
 
 def _is_state(found: dict[str, Any]) -> bool:
@@ -113,7 +108,7 @@ def _is_state(found: dict[str, Any]) -> bool:
         and isinstance(recorded, Recorded)
         and isinstance(recorded.rig, Rig)
         and isinstance(recorded.rows, list)
-        and isinstance(found.get("decoding"), Decoding)
+        and isinstance(found.get("reading"), FrameReading)
         and all(isinstance(mark, str) for mark in marks)
     )
 

@@ -15,9 +15,11 @@ from ..interrupts import uninterrupted
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
 from ..records.trajectory import FrameRow
+from ..sanity.examine import examine
+from ..sanity.finding import Finding
 from .bootstrap import Beginning, begin, check_plan
 from .epipolar_focal import FocalSum, focal_of, told_of_focal
-from .frames import Incoming, Unread, check_size, shortage
+from .frames import Incoming, Unread, check_enough, check_size, shortage, without_missing
 from .keeper import Keeper
 from .kept_maps import KeptMaps
 from .options import SequenceOptions
@@ -47,6 +49,8 @@ class Recorded:
     """Maps of some keyframes of each part."""
     told: FocalSum = field(default_factory=FocalSum)
     """What all placed frames told of the focal length, about the value that was held."""
+    findings: dict[str, str] = field(default_factory=dict)
+    """Of each likely mistake in what was given the first warning."""
     interrupted: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall-clock time by stage."""
@@ -101,7 +105,7 @@ class Run:
         """
         if frame.name in self._names:
             raise InputError("two frames have this name", frame.name, "rename one file")
-        view = self._viewed(frame)
+        frame, view = self._viewed(frame)
         with uninterrupted():
             self._names.add(frame.name)
             self._waiting.append((view, frame))
@@ -120,13 +124,20 @@ class Run:
             self._begin()
         return self.recorded
 
-    def _viewed(self, frame: Incoming) -> Unread | ThinnedMap:
+    def _viewed(self, frame: Incoming) -> tuple[Incoming, Unread | ThinnedMap]:
+        """Return a frame without what stands for missing, and as it is tracked."""
         if isinstance(frame, Unread):
-            return frame
+            return frame, frame
         check_size(frame, self.recorded.rig)
+        frame, findings = without_missing(frame)
+        self._warn(findings)
         view = view_of(frame, self._camera, self._step)
         reason = shortage(view)
-        return Unread(frame.name, reason) if reason else view
+        return frame, Unread(frame.name, reason) if reason else view
+
+    def _warn(self, findings: Iterable[Finding]) -> None:
+        for finding in findings:
+            self.recorded.findings.setdefault(finding.kind, finding.warning)
 
     def _begin(self) -> None:
         """Calibrate the frames that wait, and record them."""
@@ -135,8 +146,9 @@ class Run:
         maps = [
             m for v, m in self._waiting if isinstance(v, ThinnedMap) and not isinstance(m, Unread)
         ]
-        _check_enough([v for v, _ in self._waiting])
+        check_enough([v for v, _ in self._waiting])
         beginning = begin(maps, views, self.recorded.rig, self._options)
+        self._warn(examine([maps[beginning.first]], self.recorded.rig).findings)
         self.recorded.seconds["beginning"] = time.perf_counter() - began
         self._waiting = _without_early(self._waiting, views[beginning.first])
         self.recorded.beginning = beginning
@@ -228,19 +240,6 @@ def _row(row: FrameRow, found: Tracked) -> FrameRow:
         row, projector_std=std[:6], camera_std=std[6:], noise_px=placement.noise,
         misfit=placement.misfit, overlap=placement.overlap, agreement=placement.agreement,
     )  # fmt: skip
-
-
-def _check_enough(waiting: list[Unread | ThinnedMap]) -> None:
-    if not waiting:
-        raise InputError("there are no frames", todo="give a video, a folder or maps")
-    first = waiting[0]
-    if len(waiting) == 1:
-        raise InputError("one frame is no sequence", first.name, "use the command calibrate")
-    if isinstance(first, Unread) and all(isinstance(v, Unread) for v in waiting):
-        raise InputError(
-            f"no frame shows enough of the pattern (the first: {first.reason})", first.name,
-            "check the pattern, light and focus",
-        )  # fmt: skip
 
 
 def run_sequence(

@@ -10,7 +10,8 @@ from ..files import atomic_folder
 from ..folder_mark import Kind, read_mark, remove_marked
 from ..outputs import check_folder
 from ..records.trajectory import save_frames
-from ..sequence.resume import FILE, Decoding, save_state, unfinished_of
+from ..sequence.frame_reading import FrameReading
+from ..sequence.resume import FILE, save_state, unfinished_of
 from ..sequence.run import Run
 from .solution_folder import save_rig
 from .trajectory_files import FRAMES, save_trajectories
@@ -29,18 +30,18 @@ class UnfinishedFolder:
     """
 
     def __init__(
-        self, out: str | Path, marks: Sequence[str], decoding: Decoding, every: float = EVERY
+        self, out: str | Path, marks: Sequence[str], reading: FrameReading, every: float = EVERY
     ) -> None:
         """Write nothing yet.
 
         Args:
             out: the folder that the sequence will be written to.
             marks: of the frames that have come so far, which grows.
-            decoding: how they are decoded.
+            reading: how they are read.
             every: so many seconds.
         """
         self.path = unfinished_of(out)
-        self._marks, self._decoding, self._every = marks, decoding, every
+        self._marks, self._reading, self._every = marks, reading, every
         self._next = monotonic() + every
 
     def after_frame(self, run: Run) -> None:
@@ -56,7 +57,7 @@ class UnfinishedFolder:
         """Save."""
         with atomic_folder(self.path, Kind.UNFINISHED) as folder:
             recorded = run.recorded
-            save_state(folder / FILE, run, self._marks[: run.taken], self._decoding)
+            save_state(folder / FILE, run, self._marks[: run.taken], self._reading)
             save_frames(folder / FRAMES, recorded.rows)
             placed = [row for row in recorded.rows if not row.lost and row.part == 0]
             save_trajectories(folder, placed)

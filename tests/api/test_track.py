@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import mitsuba_endo as me
+from mitsuba_endo.png import write_png
 from mitsuba_endo.records.correspondence import CorrespondenceMap, save_map
 from mitsuba_endo.records.solution import load_solution
 from mitsuba_endo.sequence.options import SequenceOptions
@@ -89,6 +90,25 @@ def test_files_and_records_are_taken(clean: Recording, tmp_path: Path) -> None:
         assert x.world_from_camera is not None
         assert y.world_from_camera is not None
         assert np.allclose(x.world_from_camera.t, y.world_from_camera.t, atol=1e-9)
+
+
+def test_arrays_of_another_tool_under_a_mask(clean: Recording, tmp_path: Path) -> None:
+    """Oracle: the poses from the same arrays as they are counted here, without the tool's
+    pixels."""
+    mask = np.full(clean.map(0).valid.shape, 255, np.uint8)
+    mask[80:, 120:] = 0
+    write_png(tmp_path / "tool.png", mask)
+    arrays = [clean.map(k).q for k in range(3)]
+    hidden = [np.where(mask[..., None] > 0, q, np.float32(np.nan)) for q in arrays]
+    theirs = me.track(
+        [q + 1 for q in arrays], clean.rig(), options=FEW, map_convention="one-based",
+        mask=tmp_path / "tool.png",
+    )  # fmt: skip
+    ours = me.track(hidden, clean.rig(), options=FEW)
+    for x, y in zip(theirs.frames, ours.frames, strict=True):
+        assert x.world_from_camera is not None
+        assert y.world_from_camera is not None
+        np.testing.assert_allclose(x.world_from_camera.t, y.world_from_camera.t, atol=2e-3)
 
 
 def test_what_cannot_be_used_is_refused(clean: Recording, tmp_path: Path) -> None:

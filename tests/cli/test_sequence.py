@@ -123,6 +123,32 @@ def test_start_end_and_stride_choose_frames(folder: Path) -> None:
         assert [file.name for file in files] == [name + suffix for name in names]
 
 
+def test_maps_of_another_tool_under_a_mask(folder: Path) -> None:
+    """Oracle: the poses from the same maps as they are counted here, without the tool's pixels."""
+    recording = withdrawal(COUNT)
+    for name in ("theirs", "ours"):
+        (folder / name).mkdir()
+    mask = np.full(recording.map(0).valid.shape, 255, np.uint8)
+    mask[80:, 120:] = 0
+    write_png(folder / "tool.png", mask)
+    for k in range(COUNT):
+        q = recording.map(k).q
+        np.save(folder / "theirs" / f"{k}.npy", q + np.float32(1))
+        np.save(folder / "ours" / f"{k}.npy", np.where(mask[..., None] > 0, q, np.float32(np.nan)))
+    options = {"theirs": ("--map-convention", "one-based", "--mask", folder / "tool.png"),
+               "ours": ()}  # fmt: skip
+    ways = []
+    for name, given in options.items():
+        done = run("sequence", folder / name, "--rig", folder / "rig.yaml", "--out",
+                   folder / f"of_{name}", *given)  # fmt: skip
+        assert done.exit_code == 0, done.stderr
+        ways.append(load_tum(folder / f"of_{name}" / "trajectory_camera.tum"))
+    for (_, theirs), (_, ours) in zip(*ways, strict=True):
+        np.testing.assert_allclose(theirs.t, ours.t, atol=2e-3)  # of counting in single precision
+    line = _refused(folder, folder / "theirs", "--resume", folder / "of_theirs")
+    assert "was with map_convention one-based, not" in line
+
+
 def test_depth_files_hold_the_scenes_depth(folder: Path) -> None:
     """Oracle: the scene; half a millimetre is the noise of some pixels that a voxel averages."""
     recording = withdrawal(COUNT)

@@ -47,6 +47,16 @@ def test_one_for_each_frame(tmp_path: Path):
             masks.of(frame)
 
 
+def test_a_frame_without_a_tool_has_a_white_mask(tmp_path: Path):
+    """Oracle: no pixel of it is left out; one that is black all over leaves none."""
+    cv2.imwrite(str(tmp_path / "a.png"), np.full(SHAPE, 255, np.uint8))
+    cv2.imwrite(str(tmp_path / "b.png"), np.zeros(SHAPE, np.uint8))
+    masks = Masks.at(tmp_path)
+    assert masks.applied(map_("a.exr")).valid.all()
+    with pytest.raises(InputError, match=r"b\.png: leaves out no pixel or all"):
+        masks.of("b.exr")
+
+
 @pytest.mark.parametrize(
     ("image", "message"),
     [

@@ -10,9 +10,10 @@ from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.correspondence import write_map
 from mitsuba_endo.records.object_file import save_objects
 from mitsuba_endo.records.trajectory import FrameRow
+from mitsuba_endo.sequence.frame_reading import FrameReading
 from mitsuba_endo.sequence.inputs import Feed, frames_of
 from mitsuba_endo.sequence.options import SequenceOptions
-from mitsuba_endo.sequence.resume import Decoding, Past, load_state, save_state
+from mitsuba_endo.sequence.resume import Past, load_state, save_state
 from mitsuba_endo.sequence.run import Recorded, Run, run_sequence
 from tests.sequence.conftest import frames
 from tests.sequences import Recording
@@ -29,7 +30,7 @@ class Saves:
     def after_frame(self, run: Run) -> None:
         if run.taken == self.after:
             names = [f"frame{k:04d} x" for k in range(run.taken)]
-            save_state(self.folder / "state.npz", run, names, Decoding())
+            save_state(self.folder / "state.npz", run, names, FrameReading())
 
     def at_end(self, run: Run) -> None:
         pass
@@ -110,7 +111,7 @@ def test_another_rig_or_option_is_refused(past: Past, colon: Recording) -> None:
     with pytest.raises(InputError, match=r"was with voxel None, not 0\.4; give None again"):
         past.go_on(colon.rig(), replace(FEW, voxel=0.4))
     with pytest.raises(InputError, match="was with pattern None, not pattern:coded"):
-        past.check_decoding(Decoding("pattern:coded"))
+        past.check_reading(FrameReading("pattern:coded"))
     past.go_on(colon.rig(), replace(FEW, vertices=500))  # concerns the end alone
 
 
@@ -164,13 +165,13 @@ def test_a_folder_without_a_state_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"state": None}, {"state": {}}, {"marks": [3]}, {"decoding": {"refine": True}}, {"marks": ()}],
+    [{"state": None}, {"state": {}}, {"marks": [3]}, {"reading": {"refine": True}}, {"marks": ()}],
 )
 def test_objects_that_are_no_state_are_refused(
     past: Past, tmp_path: Path, change: dict[str, object]
 ) -> None:
     """They are read as objects of this version are, and lack what a sequence goes on from."""
-    whole = {"state": past.state, "marks": past.marks, "decoding": past.decoding}
+    whole = {"state": past.state, "marks": past.marks, "reading": past.reading}
     save_objects(tmp_path / "state.npz", whole)
     assert load_state(tmp_path).marks == past.marks
     save_objects(tmp_path / "state.npz", whole | change)
