@@ -177,7 +177,7 @@ def decode_images(
     from .stack_frames import decode_stacks
 
     images = [path for path in paths if is_images(path)]
-    if images and _is_stack(pattern):
+    if images and pattern is not None and _is_stack(pattern):
         if not refine:
             raise InputError("is for images of the coded grid", "--no-refine", "leave it out")
         if map_convention:
@@ -200,10 +200,8 @@ def decode_images(
     return [map_path(aside, one.name) for one in found if not one.reason]
 
 
-def _is_stack(pattern: str | None) -> bool:
+def _is_stack(pattern: str) -> bool:
     """Tell whether the name of a pattern is that of a stack of photographs."""
-    if pattern is None:
-        return False
     from ..decoding.stack_map import KINDS
 
     return pattern in KINDS

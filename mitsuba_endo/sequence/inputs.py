@@ -184,7 +184,7 @@ def _map(file: Path, name: str, rig: Rig, reading: FrameReading) -> Incoming:
     try:
         map_ = replace(load_map(file, reading.convention, size), name=name)
     except InputError as error:
-        return Unread(name, error.what, error.todo)
+        return Unread(name, error.what, error.todo or "")
     return _masked(map_, reading)
 
 
@@ -195,7 +195,7 @@ def _masked(map_: CorrespondenceMap, reading: FrameReading) -> Incoming:
     try:
         return masks.applied(map_)
     except InputError as error:
-        return Unread(map_.name, f"{error.where} {error.what}", error.todo)
+        return Unread(map_.name, f"{error.where} {error.what}", error.todo or "")
 
 
 def _decoded(images: Iterator[ImageFrame], rig: Rig, reading: FrameReading) -> Iterator[Arrival]:
