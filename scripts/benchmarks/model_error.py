@@ -47,6 +47,8 @@ class Drawn:
     warned_before: bool = False
     """Whether a warning about the camera matrix came before solving."""
     suspected: bool = False
+    unchecked: bool = False
+    """Whether it is said that something given cannot be checked, though nothing is suspected."""
     named: bool = False
     first: str = ""
     """Key of the first candidate."""
@@ -91,7 +93,7 @@ def one(kind: str, seed: int) -> Drawn:
     return Drawn(
         kind, seed,
         warned_before=any(w.startswith("camera.K") for w in checked.warnings),
-        suspected=checked.model["suspected"],
+        suspected=checked.model["suspected"], unchecked=bool(checked.model["unchecked"]),
         named=kind != RIGHT and _named(checked, KINDS[kind].names),
         first=candidates[0]["key"] if candidates else "",
         group=len(candidates[0]["group"]) if candidates else 0,
@@ -175,6 +177,8 @@ def _right(drawn: Sequence[Drawn]) -> list[Figure]:
     return [
         _figure("right: draws", len(drawn), "", ""),
         _figure("right: false alarms", _percent([d.suspected for d in drawn]), "%", "lower", 2),
+        _figure("right: told that a given value cannot be checked",
+                _percent([d.unchecked for d in drawn]), "%", ""),
         _figure("right: focal length inside 95 %", _percent(focal), "%", "higher", 93),
         _figure("right: focal length and pose inside 95 %", _percent(inside), "%", "higher", 93),
         _figure("right: width of intervals over that without the check, mean",
@@ -188,10 +192,17 @@ def _wrong(kind: str, drawn: Sequence[Drawn]) -> list[Figure]:
     noticed = [d.noticed for d in drawn]
     named = [d.named or d.refused or d.warned_before for d in drawn]
     beyond = [max(d.deviations, default=0.0) > _UNWARNED for d in drawn]
-    unwarned = [b and not n for b, n in zip(beyond, noticed, strict=True)]
+    unwarned = [b and not (n or d.unchecked)
+                for b, n, d in zip(beyond, noticed, drawn, strict=True)]  # fmt: skip
     return [
         _figure(f"{kind}: detected, {len(drawn)} draws", _percent(noticed), "%", "higher", 99),
         _figure(f"{kind}: first or second named", _percent(named), "%", "higher", 90),
+        _figure(
+            f"{kind}: told that a value cannot be checked",
+            _percent([d.unchecked for d in drawn]),
+            "%",
+            "",
+        ),
         _figure(f"{kind}: unwarned beyond 3 deviations", sum(unwarned), "", "lower", 0),
         _figure(f"{kind}: beyond 3 deviations at all", _percent(beyond), "%", "lower"),
     ]

@@ -77,10 +77,10 @@ class Fit:
 
         What is rendered and compared with the maps stays at ``state``, as the given values do.
         """
-        doubt = None if self.model is None or not self.model.corrects else self.model.nuisance
-        if doubt is None:
+        found = None if self.model is None else self.model.correction
+        if found is None:
             return self.state
-        return self.problem.retract(self.state, doubt.surface_shifts, doubt.shift)
+        return self.problem.retract(self.state, found.surface_shifts, found.shift)
 
     @property
     def problem(self) -> Problem:

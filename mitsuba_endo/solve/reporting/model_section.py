@@ -6,6 +6,7 @@ from ..inference.fit import Fit
 from ..inference.model_error.analysis import ModelCheck
 from ..inference.model_error.refits import MATRIX
 from ..inference.model_error.score_tests import ModelCandidate
+from ..inference.model_error.unchecked import Unchecked
 from ..unknowns.block import BLOCKS
 
 _LISTED = 6
@@ -36,6 +37,7 @@ def model_section(fit: Fit) -> dict[str, Any]:
             {"block": p.block, "mode": p.mode, "chance": p.chance, "refuted": p in refuted}
             for p in check.plan
         ],
+        "unchecked": [_unchecked(u) for u in check.unchecked],
         "corrected": check.corrects,
         "doubted": [] if check.nuisance is None else list(check.nuisance.blocks),
         "conclusion": conclusion(check),
@@ -51,7 +53,7 @@ def conclusion(check: ModelCheck) -> str:
             "have it, which the intervals count"
         )
     if not check.wrong:
-        return "the residuals look like noise"
+        return "; ".join(["the residuals look like noise", *map(blind_spot, check.unchecked[:1])])
     out = [
         f"{100 * structure.excess:.0f} % of the residuals is structure that the model leaves out"
         if structure.excess > _TOLD
@@ -65,6 +67,16 @@ def conclusion(check: ModelCheck) -> str:
         what = "values and intervals" if check.corrects else "the intervals"
         out.append(f"{what} allow for errors of what was given")
     return "; ".join(out)
+
+
+def blind_spot(value: Unchecked) -> str:
+    """Say what would leave no trace in the residuals, and what it would do."""
+    unit = f" {value.unit}" if value.unit else ""
+    return (
+        f"they would too if the {value.words} were {value.error:.2g}{unit} off, which moves focal "
+        f"length or pose by up to {value.moved:.0f} stated deviations: make sure of it, or add a "
+        "frame that sees more relief"
+    )
 
 
 def plan_advice(words: str) -> str:
@@ -106,9 +118,19 @@ def _todo(candidate: ModelCandidate) -> str:
 def model_warnings(fit: Fit) -> list[str]:
     """Return what must be known before trusting the values; nothing where the model holds."""
     check = fit.model
-    if check is None or not check.wrong:
+    if check is None:
         return []
+    if not check.wrong:
+        return [f"the residuals cannot check what was given: {blind_spot(u)}"
+                for u in check.unchecked[:1]]  # fmt: skip
     return [f"the model does not explain the residuals: {conclusion(check)}"]
+
+
+def _unchecked(value: Unchecked) -> dict[str, Any]:
+    return {
+        "key": value.key, "words": value.words, "error": value.error, "unit": value.unit,
+        "moves_by": value.moved,
+    }  # fmt: skip
 
 
 def _candidate(check: ModelCheck, c: ModelCandidate) -> dict[str, Any]:

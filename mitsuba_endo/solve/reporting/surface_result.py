@@ -39,8 +39,7 @@ def _with_nuisance(
     modes = inflation * fit.uncertainty.surface_modes[surface]
     if fit.model is None or (doubt := fit.model.nuisance) is None:
         return std, modes
-    shift = fit.model.correction_std * doubt.surface_shifts[surface]
-    further = np.column_stack([doubt.surface_roots[surface], shift])
+    further = np.column_stack([doubt.surface_roots[surface], fit.model.surface_error(surface)])
     total = np.sqrt(std**2 + (further**2).sum(1))
     return total, shared_modes(np.concatenate([modes, further], 1))
 

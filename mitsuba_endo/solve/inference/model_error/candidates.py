@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...unknowns.block import BLOCKS
+from ...unknowns.state import State
 from .refits import AS_GOOD, PLAN, Refit
 from .score_tests import ModelCandidate, Tests
 
@@ -32,10 +33,18 @@ class Named:
     """(G,) by how much the fit's unknowns move with each of those that explain as much."""
     plan: str | None = None
     """Block of which each frame has its own, if that is the first cause."""
+    ends: list[State] = field(default_factory=list)
+    """Where the refits of those under the fit's own projection model ended."""
 
 
-def named(tests: Tests, found: Sequence[Refit]) -> Named:
-    """Return the candidates in the order in which they explain the residuals."""
+def named(tests: Tests, found: Sequence[Refit], law: str) -> Named:
+    """Return the candidates in the order in which they explain the residuals.
+
+    Args:
+        tests: of the fit.
+        found: refits, the best first.
+        law: projection model of the fit.
+    """
     best = max((r.gain for r in found), default=0.0)
     if best < GROSS:
         return _by_scores(tests)
@@ -47,7 +56,8 @@ def named(tests: Tests, found: Sequence[Refit]) -> Named:
     plan = found[0].way.key.removeprefix(PLAN) if found[0].way.layout is not None else None
     shifts = [r.shift for r in as_good if r.shift is not None]
     left = min(r.left for r in as_good)
-    return Named([*_grouped(first, ALIKE), *rest], True, 1 - left, shifts, plan)
+    ends = [r.end for r in as_good if r.way.layout is None and r.way.law == law]
+    return Named([*_grouped(first, ALIKE), *rest], True, 1 - left, shifts, plan, ends)
 
 
 def _by_scores(tests: Tests) -> Named:

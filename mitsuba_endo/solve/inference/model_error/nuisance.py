@@ -40,6 +40,11 @@ class Nuisance:
     """(V, K) of every surface's values: products are the covariances that come of it."""
     surface_shifts: list[Floats]
     """(V,) by how much every surface's values are off, likewise."""
+    step: Floats
+    """(G,) W m of unknowns and given values together."""
+    roots: dict[str, Floats]
+    """Square-root information (m, width) of the priors that were used, against data with the
+    design effect that was used."""
 
 
 def doubtful(rig: Rig, layout: Layout, stated: bool) -> dict[str, Floats]:
@@ -83,7 +88,21 @@ def nuisance(
         tuple(roots), (own @ Q) @ own.T, own @ mean,
         [X @ (W @ root) for X in extended.responses],
         [-(X @ (W @ mean)) for X in extended.responses],  # surfaces give way: the step is -A^-1 B
+        W @ mean, _widened_roots(extended, roots, wider),
     )  # fmt: skip
+
+
+def _widened_roots(
+    extended: Extended, roots: Mapping[str, Floats], wider: Floats
+) -> dict[str, Floats]:
+    """Return the priors' square roots with their deviations multiplied, in the steps' order."""
+    out, first = {}, 0
+    for name, _ in extended.layout.slots:
+        if name in roots:
+            size = len(roots[name])
+            out[name] = roots[name] / wider[first : first + size, None]
+            first += size
+    return out
 
 
 def _prior_steps(extended: Extended, roots: Mapping[str, Floats]) -> Floats:

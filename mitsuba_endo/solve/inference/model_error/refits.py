@@ -5,7 +5,7 @@ that what they reach can be compared; the other projection model has none; the c
 its distortion as a whole have several, and come after single ones that explain as much.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,16 +13,22 @@ from numpy.typing import NDArray
 
 from ....geometry.projection_models import PROJECTION_MODELS
 from ....geometry.transforms import RigidTransform
-from ....initialisation.correspondences import Correspondences
-from ....initialisation.relative_pose_ransac import propose
 from ....records.rig import Rig
-from ....robust import MAD_TO_STD
-from ...costs.coordinate_residual import Observations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout, make_layout
 from ...unknowns.state import State
-from .epipolar_fit import Look, along, derivatives, look, possible, thinned
+from .epipolar_fit import possible
+from .epipolar_solve import (
+    EpipolarSample,
+    Point,
+    Way,
+    noise_of,
+    point_at,
+    robust_cost,
+    sampled,
+    solved,
+)
 from .extended import freed, given_blocks, widened
 from .sharing_tests import alternatives
 
@@ -45,33 +51,12 @@ AS_GOOD = 0.9
 """Share of the best refit's gain from which on another explains the residuals as well."""
 _HEAT, _FINALISTS, _FINAL = 4, 4, 16
 """Iterations of every way, how many of the best go on, and for how many more."""
-_TRIES = 4
-"""Dampings tried for a step before a refit ends where it is. Chosen."""
-_SPREAD, _RANKS, _FEW = (0.8, 1.2, 2.0), 2, 300
-"""Focal lengths, in extents of what was seen of the pattern, from which another projection model
-is tried, how many poses each, and how many correspondences propose them."""
-_SETTLED = 1e-3
-"""Relative fall of the cost at which a refit ends."""
-_SETTLED_NOISE = 0.99
-"""A noise that falls to no less than this share of itself in a step has settled. Chosen."""
-_DAMPING = (1e-4, 10.0, 0.1)
-"""First one, and the factors after a failed and a successful step."""
-_CAUCHY = 2.5
-"""Scale of the robust loss in noise standard deviations."""
-_FAR = 100.0
-"""Deviations that count for a pixel without a residual."""
-
-
-@dataclass(frozen=True, eq=False)
-class Way:
-    """One thing to free: directions of given values, or another projection model."""
-
-    key: str
-    law: str
-    steps: Sequence[tuple[str, Floats]] = ()
-    """(block, step of its value by one unit of the candidate)."""
-    layout: Layout | None = None
-    """Another plan of sharing; None for that of the fit."""
+_LOST = (_FOCAL, MATRIX, LENS, f"{LENS}.k1")
+"""Ways that begin far from the fit too, after gross errors; another projection model does so."""
+_SIDES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0))
+"""Directions in which the projector may stand; opposite ones have the same residuals."""
+_FAR_HEAT = 8
+"""Iterations of ways that begin far from the fit, before they are compared. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,30 +72,8 @@ class Refit:
     """(G,) by how much the fit's unknowns moved; None where they are others."""
     left: float
     """Share of the residuals' energy that it leaves."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Sample:
-    """What a refit looks at: a part of every frame's pixels."""
-
-    layout: Layout
-    observed: Sequence[Observations]
-    given: dict[str, Floats]
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Where a refit stands."""
-
-    state: State
-    amounts: Floats
-    """(K,) of the directions that are free."""
-    looks: list[Look]
-
-    @property
-    def r(self) -> Floats:
-        """(N,) residuals of all frames."""
-        return np.concatenate([at.r for at in self.looks])
+    end: State
+    """Of unknowns and given values, where it ended."""
 
 
 def ways(layout: Layout, rig: Rig, law: str) -> list[Way]:
@@ -161,7 +124,7 @@ def refits(
         result: the fit.
         rig: of it.
         tried: the ways.
-        far: whether the fit may be far from what another projection model leads to.
+        far: whether gross errors may have led the fit far from where it should be.
 
     Returns:
         The best first; among those that explain as much, the simplest.
@@ -169,21 +132,18 @@ def refits(
     problem, layout = result.problem, result.problem.layout
     if not possible(problem, result.state):
         return []
-    wide = make_layout(freed(rig, given_blocks(layout)), layout.frames)
-    stride = max(1, round(np.sqrt(problem.observations / PIXELS)))
-    sample = _Sample(layout, [thinned(o, stride) for o in problem.observed],
-                     {n: v for n, v in wide.given.items() if v is not None})  # fmt: skip
+    sample = sampled(result, rig, PIXELS)
     none = Way("", problem.law)
-    base = _solved(sample, none, _at(sample, none, result.state), _FINAL)
+    base = solved(sample, none, point_at(sample, none, result.state), _FINAL)
     ends = _race(sample, tried, base, far)
-    sigma = min([_noise(base.r), *(_noise(end.r) for _, end in ends)])
-    before = _noise(base.r)
+    sigma = min([noise_of(base.r), *(noise_of(end.r) for _, end in ends)])
+    before = noise_of(base.r)
     out = [
         Refit(
             way, float(end.amounts[0]) if len(end.amounts) else 1.0,
-            _cost(base.r, sigma) - _cost(end.r, sigma),
+            robust_cost(base.r, sigma) - robust_cost(end.r, sigma),
             layout.difference(base.state, end.state) if way.layout is None else None,
-            min((_noise(end.r) / before) ** 2, 1.0),
+            min((noise_of(end.r) / before) ** 2, 1.0), end.state,
         )
         for way, end in ends
     ]  # fmt: skip
@@ -193,139 +153,52 @@ def refits(
 
 
 def _race(
-    sample: _Sample, tried: Sequence[Way], base: _Point, far: bool
-) -> list[tuple[Way, _Point]]:
+    sample: EpipolarSample, tried: Sequence[Way], base: Point, far: bool
+) -> list[tuple[Way, Point]]:
     """Return where ways end, those that are behind after some iterations left out."""
-    heats: dict[str, tuple[Way, _Point]] = {}
+    heats: dict[str, tuple[Way, Point]] = {}
     for way in tried:
-        ends = [_solved(sample, way, start, _HEAT) for start in _starts(sample, way, base, far)]
-        heats[way.key] = way, min(ends, key=lambda end: _cost(end.r, _noise(base.r)))
-    sigma = min([_noise(base.r), *(_noise(end.r) for _, end in heats.values())])
-    order = sorted(heats.values(), key=lambda e: _cost(e[1].r, sigma))
+        starts = _starts(sample, way, base, far)
+        heat = _HEAT if len(starts) == 1 else _FAR_HEAT
+        ends = [solved(sample, way, start, heat) for start in starts]
+        heats[way.key] = way, min(ends, key=lambda end: robust_cost(end.r, noise_of(base.r)))
+    sigma = min([noise_of(base.r), *(noise_of(end.r) for _, end in heats.values())])
+    order = sorted(heats.values(), key=lambda e: robust_cost(e[1].r, sigma))
     return [
-        (way, _solved(sample, way, end, _FINAL))
+        (way, solved(sample, way, end, _FINAL))
         for i, (way, end) in enumerate(order)
         if i < _FINALISTS or way.key in (MATRIX, LENS, _FOCAL) or way.law != base.looks[0].law
     ]
 
 
-def _starts(sample: _Sample, way: Way, base: _Point, far: bool) -> list[_Point]:
-    """Return where a way begins: another projection model from poses of its own too."""
+def _starts(sample: EpipolarSample, way: Way, base: Point, far: bool) -> list[Point]:
+    """Return where a way begins: after gross errors also far from where the fit was led to."""
     state = base.state
     if way.layout is not None:
         state = widened(state, sample.layout, way.layout)
-    if way.law == base.looks[0].law or not far:
-        return [_at(sample, way, state)]
-    return [_at(sample, way, s) for s in (state, *_proposed(sample, way.law, base))]
+    lost = far and (way.law != base.looks[0].law or way.key in _LOST)
+    return [point_at(sample, way, s) for s in (state, *(_sideways(sample, base) if lost else ()))]
 
 
-def _proposed(sample: _Sample, law: str, base: _Point) -> list[State]:
-    """Return states with the poses that five points each propose under a projection model.
+def _sideways(sample: EpipolarSample, base: Point) -> Iterator[State]:
+    """Yield states whose projectors stand beside the camera, as they do in endoscopes.
 
-    The focal length of another model may have led far away from its own.
+    Their rotations are the fit's, which gross errors turn by a few degrees only; translation and
+    focal length they may lead anywhere.
     """
-    free = sample.layout.free["focal"] and sample.layout.free["projector_pose"]
-    ways_on = [(focal, rank) for focal in _focals(sample) for rank in range(_RANKS)]
-    return [_proposal(sample, law, base, *way) for way in ways_on] if free else []
+    if not (sample.layout.free["focal"] and sample.layout.free["projector_pose"]):
+        return
+    state = base.state
+    focal = (np.log([_extent(sample)]),) * len(state.values["focal"])
+    for side in _SIDES:
+        t = np.array(side) / np.linalg.norm(side)
+        poses = tuple(
+            RigidTransform(pose.R, float(np.linalg.norm(pose.t)) * t)
+            for pose in state.values["projector_pose"]
+        )
+        yield replace(state, values={**state.values, "focal": focal, "projector_pose": poses})
 
 
-def _focals(sample: _Sample) -> list[float]:
-    """Return focal lengths that spread what was seen of the pattern over usual angles."""
-    extent = max(float(np.ptp(o.q, axis=1).max()) for o in sample.observed)
-    return [share * extent for share in _SPREAD]
-
-
-def _proposal(sample: _Sample, law: str, base: _Point, focal: float, rank: int) -> State:
-    state, owners = base.state, sample.layout.owners["projector_pose"]
-    values = {"focal": tuple(np.log([focal]) for _ in state.values["focal"])}
-    poses = list(state.values["projector_pose"])
-    for owner in set(owners):
-        k = owners.index(owner)
-        at, observed = base.looks[k], sample.observed[k]
-        model = state.projector(k, observed.camera, law)
-        assert model is not None  # see `possible`
-        data = Correspondences(np.arange(observed.count), _unit(at.rays), observed.q)
-        few = data.take(np.arange(0, len(data), max(1, len(data) // _FEW)))
-        found = propose(few, model, np.array([focal]))
-        if found:
-            length = float(np.linalg.norm(poses[owner].t))
-            pose = found[min(rank, len(found) - 1)].pose
-            poses[owner] = RigidTransform(pose.R, length * pose.t)
-    return replace(state, values={**state.values, **values, "projector_pose": tuple(poses)})
-
-
-def _unit(rays: Floats) -> Floats:
-    return rays / np.linalg.norm(rays, axis=0)
-
-
-def _solved(sample: _Sample, way: Way, now: _Point, iterations: int) -> _Point:
-    """Minimise by Levenberg-Marquardt on reweighted least squares, the scale falling along."""
-    mu, up, down = _DAMPING
-    sigma = _noise(now.r)
-    for _ in range(iterations):
-        J, r, cost = _jacobian(sample, way, now), np.nan_to_num(now.r), _cost(now.r, sigma)
-        w = np.where(np.isfinite(now.r), 1 / (1 + (r / (_CAUCHY * sigma)) ** 2), 0.0)
-        H, g = (J * w) @ J.T, (J * w) @ r
-        for _ in range(_TRIES):
-            trial = _moved(sample, way, now, _damped(H, g, mu))
-            gained = cost - _cost(trial.r, sigma)
-            if gained >= 0:
-                break
-            mu *= up
-        else:
-            break
-        mu, now = mu * down, trial
-        followed = min(sigma, _noise(now.r))
-        if gained < _SETTLED * cost and followed > _SETTLED_NOISE * sigma:
-            break
-        sigma = followed
-    return now
-
-
-def _damped(H: Floats, g: Floats, mu: float) -> Floats:
-    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    A = H * np.outer(scale, scale) + mu * np.eye(len(g))
-    return -scale * np.linalg.lstsq(A, scale * g, rcond=1e-12)[0]
-
-
-def _at(
-    sample: _Sample, way: Way, state: State, amounts: Floats | None = None,
-    last: Sequence[Look | None] = (),
-) -> _Point:  # fmt: skip
-    """Return a point at a state with the way's values moved by ``amounts``."""
-    amounts = np.zeros(len(way.steps)) if amounts is None else amounts
-    given = {name: sample.given[name] for name, _ in way.steps}
-    for (name, step), amount in zip(way.steps, amounts, strict=True):
-        given[name] = BLOCKS[name].retract(given[name], amount * step)
-    values = {name: (value,) * len(state.values[name]) for name, value in given.items()}
-    state = replace(state, values={**state.values, **values})
-    last = last or [None] * sample.layout.frames
-    looks = [look(o, way.law, state, k, last[k]) for k, o in enumerate(sample.observed)]
-    return _Point(state, amounts, looks)
-
-
-def _moved(sample: _Sample, way: Way, now: _Point, step: Floats) -> _Point:
-    layout = way.layout or sample.layout
-    size = layout.columns
-    state = layout.retract(now.state, step[:size])
-    return _at(sample, way, state, now.amounts + step[size:], now.looks)
-
-
-def _jacobian(sample: _Sample, way: Way, at: _Point) -> Floats:
-    """Return the derivatives (G + K, N), zero where there is no residual."""
-    parts, layout = [], way.layout or sample.layout
-    for k, (observed, now) in enumerate(zip(sample.observed, at.looks, strict=True)):
-        own = derivatives(observed, way.law, at.state, layout, k, now)
-        further = [along(observed, way.law, at.state, k, now, *step) for step in way.steps]
-        parts.append(np.concatenate([own, np.reshape(further, (-1, len(now.r)))]))
-    return np.nan_to_num(np.concatenate(parts, 1))
-
-
-def _noise(r: Floats) -> float:
-    return max(MAD_TO_STD * float(np.nanmedian(np.abs(r))), 1e-6)
-
-
-def _cost(r: Floats, sigma: float) -> float:
-    """Return the robust cost, noise variances."""
-    square = np.where(np.isfinite(r), (r / sigma) ** 2, _FAR**2)
-    return float(_CAUCHY**2 / 2 * np.log1p(square / _CAUCHY**2).sum())
+def _extent(sample: EpipolarSample) -> float:
+    """Return the size of what was seen of the pattern, pattern pixels."""
+    return max(float(np.ptp(o.q, axis=1).max()) for o in sample.observed)

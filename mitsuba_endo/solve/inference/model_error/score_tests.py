@@ -32,6 +32,23 @@ _UNSEEN = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
+class Testable:
+    """One thing that can be tested."""
+
+    key: str
+    words: str
+    unit: str
+    block: str | None
+    """Whose given value it is; None for what is no block."""
+    limit: float
+    """Error, in its unit, that no careful calibration makes; only smaller deviations tell."""
+    direction: Floats
+    """(G,) by one unit of it."""
+    step: Floats | None = None
+    """(width,) of the block's value by one unit, where it is one."""
+
+
+@dataclass(frozen=True, eq=False)
 class ModelCandidate:
     """One thing that may be wrong, and what the residuals say of it."""
 
@@ -87,16 +104,16 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
         rig: of the fit.
         variance: of one whitened coordinate.
     """
-    named = _candidates(extended, rig)
-    columns = np.array([direction for *_, direction in named]).T
+    named = candidates(extended, rig)
+    columns = np.array([c.direction for c in named]).T
     W, information, score = extended.directions(columns)
     own = np.einsum("gk,gh,hk->k", columns, extended.S, columns)
     seen = np.diag(information) > _UNSEEN * own
-    seen &= np.diag(information) > variance / np.array([limit for *_, limit, _ in named]) ** 2
+    seen &= np.diag(information) > variance / np.array([c.limit for c in named]) ** 2
     named = [n for n, is_seen in zip(named, seen, strict=True) if is_seen]
     W, information, score = W[:, seen], information[np.ix_(seen, seen)], score[seen]
     # Together, values may have directions that the data hardly see although they see each.
-    limits = np.array([limit for *_, limit, _ in named])
+    limits = np.array([c.limit for c in named])
     information = information + np.diag(variance / limits**2)
     step, rank = _joint(information, score)
     gain = float(-score @ step)
@@ -107,12 +124,10 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
     structured = max(before.structure.excess * energy, 1e-300)
     found = [
         ModelCandidate(
-            key, words, unit, block, float(-g / i), float(np.sqrt(noise / i)), float(g * g / i),
-            -g / i * w[extended.solved], min(float(g * g / i / structured), 1.0),
+            c.key, c.words, c.unit, c.block, float(-g / i), float(np.sqrt(noise / i)),
+            float(g * g / i), -g / i * w[extended.solved], min(float(g * g / i / structured), 1.0),
         )
-        for (key, words, unit, block, _, _), g, i, w in zip(
-            named, score, np.diag(information), W.T, strict=True
-        )
+        for c, g, i, w in zip(named, score, np.diag(information), W.T, strict=True)
     ]  # fmt: skip
     chance = float(chdtrc(max(rank, 1), max(gain, 0.0) / noise))
     blocks = _blocks(found, information, score, W[extended.solved], structured, noise)
@@ -136,12 +151,10 @@ def _energy(result: OptimisationResult) -> float:
     )
 
 
-def _candidates(
-    extended: Extended, rig: Rig
-) -> list[tuple[str, str, str, str | None, float, Floats]]:
-    """Return key, words, unit, block, largest deviation and direction (G,) of every candidate."""
+def candidates(extended: Extended, rig: Rig) -> list[Testable]:
+    """Return everything that can be tested."""
     layout, size = extended.layout, len(extended.g)
-    out: list[tuple[str, str, str, str | None, float, Floats]] = []
+    out: list[Testable] = []
     rig = freed(rig, given_blocks(extended.result.problem.layout))
     for name in given_blocks(extended.result.problem.layout):
         root = BLOCKS[name].doubt(rig, layout.given[name])
@@ -154,11 +167,15 @@ def _candidates(
                 direction[layout.slots[name, owner]] = T.T @ suspect.step
                 key = f"{name}.{suspect.part}" if suspect.part else name
                 limit = np.inf if root is None else _USEFUL / np.linalg.norm(root @ suspect.step)
-                out.append((key, suspect.words, suspect.unit, name, float(limit), direction))
+                out.append(Testable(
+                    key, suspect.words, suspect.unit, name, float(limit), direction, suspect.step
+                ))  # fmt: skip
     for i, special in enumerate(extended.specials):
         direction = np.zeros(size)
         direction[layout.columns + i] = 1.0
-        out.append((special.key, special.words, special.unit, None, special.limit, direction))
+        out.append(
+            Testable(special.key, special.words, special.unit, None, special.limit, direction)
+        )
     return out
 
 
