@@ -118,11 +118,8 @@ def _todo(candidate: ModelCandidate) -> str:
 def model_warnings(fit: Fit) -> list[str]:
     """Return what must be known before trusting the values; nothing where the model holds."""
     check = fit.model
-    if check is None:
+    if check is None or not check.wrong:
         return []
-    if not check.wrong:
-        return [f"the residuals cannot check what was given: {blind_spot(u)}"
-                for u in check.unchecked[:1]]  # fmt: skip
     return [f"the model does not explain the residuals: {conclusion(check)}"]
 
 
