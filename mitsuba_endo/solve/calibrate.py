@@ -15,6 +15,7 @@ from ..records.history import Observe
 from ..records.rig import AUTO_LAW, Rig
 from ..records.solution import Outcome
 from ..sanity.examine import examine
+from .conclusion import infer, stopping
 from .contradictions import check_surface, unused_deviations
 from .frames.weights import balanced
 from .history import History
@@ -23,7 +24,7 @@ from .inference.model_choice import cheaper, choose_law
 from .job import Job, Optimised, with_centre
 from .minimisers.minimise import Progress, minimiser_of
 from .options import Options
-from .pipeline import infer, optimise, optimise_again
+from .pipeline import optimise, optimise_again
 from .reporting.assemble import assemble
 
 
@@ -88,17 +89,17 @@ def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:
     """
     parts = 2 * len(jobs) if len(jobs) > 1 else 1  # an only one has no others to start from
     last = _part(say, parts, parts)
-    stopping = _part(lambda share, step: say(share, f"Stopping: {step.lower()}"), parts, parts)
+    end = _part(stopping(say), parts, parts)
     jobs = [with_centre(job, _part(say, i, parts)) for i, job in enumerate(jobs)]
     done: list[Optimised] = []
     for i, job in enumerate(jobs):
         done.append(optimise(job, _part(say, i, parts)))
         if done[-1].result.outcome is Outcome.INTERRUPTED:
-            return [infer(job, done[-1], stopping)]
+            return [infer(job, done[-1], end)]
     for i, job in enumerate(jobs):
         done[i] = _from_others(job, i, done, _part(say, len(jobs) + i, parts))
         if done[i].result.outcome is Outcome.INTERRUPTED:
-            return [infer(job, done[i], stopping)]
+            return [infer(job, done[i], end)]
     return [infer(job, d, last) for job, d in zip(jobs, done, strict=True)]
 
 

@@ -64,6 +64,8 @@ class Optimised:
     result: OptimisationResult
     predicted: list[Direction]
     """What its start left free."""
+    refuted: str = ""
+    """Why the sharing plan is wrong, where most frames contradict it."""
 
 
 def with_centre(job: Job, say: Progress) -> Job:

@@ -9,6 +9,7 @@ from ..records.calibration import TraceRow
 from ..records.checkpoint import Checkpoint
 from ..records.correspondence import CorrespondenceMap
 from ..records.solution import LeftOut, Outcome
+from .conclusion import stopping
 from .costs.objective import Problem, make_problem
 from .costs.registry import priors_of
 from .frames.initial_poses import (
@@ -24,18 +25,17 @@ from .frames.resume import resumed_maps, resumed_problem
 from .frames.separate_surfaces import separate_surfaces
 from .frames.single_frames import solve_alone
 from .history import History
-from .inference.covariance import uncertainty
-from .inference.fit import Fit, FrameSolution
+from .inference.fit import FrameSolution
 from .inference.frame_consistency import consistencies, doubtful_frames, plan_refuted, worst
-from .inference.model_error.analysis import check_model
 from .inference.observability import Direction
 from .inference.predicted_observability import predicted_directions
 from .job import Job, Optimised
 from .minimisers.minimise import OnIteration, Progress, minimise
 from .minimisers.result import OptimisationResult
-from .minimisers.smoothing import smooth_surfaces
 from .unknowns.state import State
 
+NOT_REACHED = "the calibration was stopped before its turn"
+"""Why a frame is left out that was not yet solved when the user stopped."""
 _MAX_EXTENSIONS = 10
 """Times that the surface may grow while cameras that started at one place spread."""
 
@@ -115,8 +115,13 @@ def _own_surfaces(job: Job, say: Progress) -> Optimised:
 
 
 def _shared_surface(job: Job, say: Progress) -> Optimised:
-    """Solve every frame alone, register them, and optimise all with one surface."""
+    """Solve every frame alone, register them, and optimise all with one surface.
+
+    Where the user stops while frames are solved alone, those that are done are brought together.
+    """
     alone, left_out = _solved_alone(job, say)
+    stopped = any(left.reason == NOT_REACHED for left in left_out)
+    say = stopping(say) if stopped else say
     say(0.5, "Registering the frames")
     with job.timed("registration"):
         registered = _register(job, alone)
@@ -129,7 +134,8 @@ def _shared_surface(job: Job, say: Progress) -> Optimised:
     notes = list(dict.fromkeys(note for k in kept for note in alone[k].notes))
     say(0.6, "Optimising all frames")
     with job.timed("optimise"):
-        done = _optimise_joint(job, [alone[k] for k in kept], [registered[k] for k in kept], say)
+        report = _stop if stopped else _reporter(job, say, 0.6)
+        done = _optimise_joint(job, [alone[k] for k in kept], [registered[k] for k in kept], report)
     return replace(done, left_out=left_out + done.left_out, notes=notes + done.notes)
 
 
@@ -143,7 +149,13 @@ def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameSolution], list[Le
         layout = job.layout(len(maps))
         told = _frames_of(say, 0.3, 0.5, "Solving every frame alone")
         alone = solve_alone(maps, starts, job.camera, job.rig, layout, job.law, job.options, told)
-    return alone, left_out
+    missing = [LeftOut(name=m.name, reason=NOT_REACHED) for m in maps[len(alone) :]]
+    return alone, [*left_out, *missing]
+
+
+def _stop(_row: TraceRow, _state: State) -> None:
+    """End an optimisation after its first iteration, as the user's own interrupt would."""
+    raise KeyboardInterrupt
 
 
 def _frames_of(say: Progress, begin: float, end: float, step: str) -> OnFrame:
@@ -191,13 +203,13 @@ def _named(reason: str, alone: Sequence[FrameSolution]) -> str:
 
 
 def _optimise_joint(
-    job: Job, alone: list[FrameSolution], registered: list[Registration], say: Progress
+    job: Job, alone: list[FrameSolution], registered: list[Registration], report: OnIteration
 ) -> Optimised:
     """Optimise all frames; leave out one that contradicts the others and try again."""
     left_out: list[LeftOut] = []
     while True:  # but not for long: each frame left out costs a solution
         problem, state = _joint_problem(job, alone, seen_from_first(registered))
-        result, predicted = _optimise(job, problem, state, _reporter(job, say, 0.6))
+        result, predicted = _optimise(job, problem, state, report)
         judged = consistencies(alone, result) if len(alone) > 1 else []
         wrong = None if result.outcome is Outcome.INTERRUPTED else worst(judged)
         refuted = plan_refuted(judged, problem.layout, len(left_out))
@@ -206,10 +218,11 @@ def _optimise_joint(
         left_out.append(LeftOut(name=alone[wrong].name, reason=judged[wrong].reason))
         alone = [a for k, a in enumerate(alone) if k != wrong]
         registered = [p for k, p in enumerate(registered) if k != wrong]
-    doubts = [refuted] if wrong is not None and refuted else doubtful_frames(judged)
+    refuted = refuted if wrong is not None else ""
     names = {a.name for a in alone}
     maps = [m for m in job.maps if m.name in names]
-    return Optimised(maps, left_out, doubts, result, predicted)
+    doubts = [] if refuted else doubtful_frames(judged)
+    return Optimised(maps, left_out, doubts, result, predicted, refuted)
 
 
 def _joint_problem(
@@ -265,23 +278,3 @@ def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
         say(begin + (1 - begin) * share, f"Optimising (iteration {row.iteration}{focal})")
 
     return report
-
-
-def infer(job: Job, done: Optimised, say: Progress) -> Fit:
-    """Smooth the surface to be reported and tell how well everything is known."""
-    result, model = done.result, None
-    if job.options.check_model:
-        say(0.0, "Testing the model")
-        with job.timed("model"):
-            decoded = all(m.correlation_px is not None for m in done.maps)
-            model = check_model(result, job.rig, decoded=decoded)
-    say(0.5, "Computing standard deviations")
-    with job.timed("surface"):
-        reported = smooth_surfaces(result, job.options)
-    with job.timed("uncertainty"):
-        known = uncertainty(result, reported, job.options.jackknife)
-    if model is not None:
-        model = replace(model, understated=max(known.sigma / result.noise.sigma, 1.0))
-    given, notes = [m.name for m in job.maps], [*job.notes, *done.notes]
-    return Fit(job.law, done.maps, done.left_out, given, result, reported, model, known, notes,
-               job.timings, done.predicted, job.history.snapshots)  # fmt: skip

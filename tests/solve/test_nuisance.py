@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mitsuba_endo.geometry.projection_models import projector_model
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.records.rig import Rig
-from mitsuba_endo.solve import pipeline
+from mitsuba_endo.solve import conclusion
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.inference.model_error.analysis import check_model
 from mitsuba_endo.solve.inference.model_error.extended import Extended, extend
@@ -104,7 +104,7 @@ def fitted() -> tuple[Rig, CorrespondenceMap, OptimisationResult]:
     kept: list[OptimisationResult] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            pipeline, "check_model",
+            conclusion, "check_model",
             lambda r, g, *, decoded: kept.append(r) or check_model(r, g, decoded=decoded),
         )  # fmt: skip
         calibrate([map_], rig)

@@ -22,6 +22,9 @@ from .initial_poses import OnFrame
 from .restart import with_restarts
 from .separate_surfaces import separate_surfaces
 
+_USABLE = 2
+"""Frames from which on there is something to bring together when the user stops."""
+
 
 def solve_alone(
     maps: Sequence[CorrespondenceMap],
@@ -37,8 +40,11 @@ def solve_alone(
 
     ``on_frame`` is called with the number of each, from 1, and how many there are.
 
+    Returns:
+        Of every frame; of those that were done where the user stopped.
+
     Raises:
-        KeyboardInterrupt: the user stopped: there is nothing yet to go on from.
+        KeyboardInterrupt: the user stopped before two frames were done.
     """
 
     def solve(map_: CorrespondenceMap, start: Start) -> OptimisationResult:
@@ -49,12 +55,17 @@ def solve_alone(
 
     out = []
     for k, (map_, start) in enumerate(zip(maps, starts, strict=True), 1):
-        if on_frame is not None:
-            on_frame(k, len(maps))
-        result = with_restarts([map_], [start], camera, lambda s, m=map_: solve(m, s[0]))
-        if result.outcome is Outcome.INTERRUPTED:
-            raise KeyboardInterrupt
-        out.append(frame_solution(result, camera, options, start.notes))
+        try:
+            if on_frame is not None:
+                on_frame(k, len(maps))
+            result = with_restarts([map_], [start], camera, lambda s, m=map_: solve(m, s[0]))
+            if result.outcome is Outcome.INTERRUPTED:
+                raise KeyboardInterrupt
+            out.append(frame_solution(result, camera, options, start.notes))
+        except KeyboardInterrupt:
+            if len(out) < _USABLE:
+                raise
+            break
     return out
 
 

@@ -70,6 +70,8 @@ class Fit:
     """What the data were expected to leave free, before the optimisation."""
     history: list[Snapshot]
     """Coarse states from the start to the end."""
+    refuted: str = ""
+    """Why the sharing plan is wrong, where most frames contradict it."""
 
     @cached_property
     def estimate(self) -> State:

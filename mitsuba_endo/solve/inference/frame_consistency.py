@@ -147,7 +147,7 @@ def plan_refuted(found: list[Consistency], layout: Layout, left_out: int) -> str
         return ""
     ratio = np.median([a.ratio for a in contradicting])
     return (
-        f"the plan is wrong: with one projector pose for all, {left_out + len(contradicting)} of "
+        f"with one projector pose for all, {left_out + len(contradicting)} of "
         f"{count} frames contradict the others (residuals {ratio:.2g} times those alone); do not "
         "trust the values, and calibrate with --share projector_pose=per_frame"
     )

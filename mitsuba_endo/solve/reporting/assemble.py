@@ -83,7 +83,7 @@ def assemble(
             *_implausible_scale(fit, unit, renderings, rig),
         ],
     )
-    solution = solution.model_copy(update={"verdict": verdict(solution)})
+    solution = solution.model_copy(update={"verdict": verdict(solution, fit.refuted)})
     return Calibration(
         solution, refined, surfaces[0], frame_maps(fit, renderings),
         with_fixed_cost(fit.result.trace, fit.result.noise),

@@ -11,10 +11,16 @@ _FEW = 3
 """Frames up to which every pose has a sentence of its own."""
 
 
-def verdict(solution: Solution) -> list[str]:
-    """Return one sentence for each unknown, the most important first."""
+def verdict(solution: Solution, refuted: str = "") -> list[str]:
+    """Return one sentence for each unknown, the most important first.
+
+    Args:
+        solution: all but its verdict.
+        refuted: why the sharing plan is wrong, which comes before everything else.
+    """
     unit = solution.units if solution.units == "mm" else "baselines"
-    out = [_scale(solution)]
+    out = [f"Plan: wrong; {refuted}."] if refuted else []
+    out.append(_scale(solution))
     out += _projection_model(solution) + _intrinsics(solution)
     first = solution.frames[0].projector_from_camera
     several = any(f.projector_from_camera != first for f in solution.frames)
