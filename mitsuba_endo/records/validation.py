@@ -1,11 +1,13 @@
 """Schemas of YAML and JSON files, with errors that name the file and the field."""
 
 import contextlib
+import dataclasses
 import difflib
 from collections.abc import Iterator
-from typing import Annotated, Any, TypeVar
+from functools import lru_cache
+from typing import Annotated, Any, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from ..errors import InputError, shown
 
@@ -24,6 +26,8 @@ Real = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(gt=0, le=LARGEST)]
 Size = Annotated[int, Field(gt=0, le=65_536)]
 """Width or height of an image or pattern, pixels."""
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0)]
 Vector2 = Annotated[list[Real], Field(min_length=2, max_length=2)]
 Vector3 = Annotated[list[Real], Field(min_length=3, max_length=3)]
 Matrix3 = Annotated[
@@ -61,6 +65,28 @@ def validated(source: str) -> Iterator[None]:
         first = error.errors()[0]
         path = ".".join(_path(first))
         raise InputError(_misfit(first), f"{source}: {path or error.title}", "mend it") from None
+
+
+def check_fields(options: Any, source: str) -> None:
+    """Refuse an instance of a dataclass whose values do not suit their annotations.
+
+    Raises:
+        InputError: names the field and what is wrong.
+    """
+    with validated(source):
+        _fields_of(type(options))(**{name: getattr(options, name) for name in _hints(options)})
+
+
+@lru_cache
+def _fields_of(cls: type) -> type[BaseModel]:
+    fields: Any = {name: (hint, ...) for name, hint in _hints(cls).items()}
+    strict = ConfigDict(strict=True, allow_inf_nan=False, extra="forbid")
+    return create_model(cls.__name__, __config__=strict, **fields)
+
+
+def _hints(cls: Any) -> dict[str, Any]:
+    known = get_type_hints(cls if isinstance(cls, type) else type(cls), include_extras=True)
+    return {field.name: known[field.name] for field in dataclasses.fields(cls)}
 
 
 _SYMBOLS = {"K", "R", "K_std"}  # the only capitalised keys of our files
