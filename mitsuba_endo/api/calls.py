@@ -1,6 +1,7 @@
 """The steps, each one call, from what callers have to what they want."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ..records.sharing_plan import with_plan
 from ..refine.image_decoder import ImageDecoder
 from ..rendering.render import Capture, render_capture
 from ..rendering.scene import load_scene
+from ..show.photographs import KeptPhotographs
 from ..show.read_folder import read_solution_folder
 from ..solve.calibrate import calibrate as solve
 from ..solve.options import Options
@@ -65,12 +67,16 @@ def calibrate(
     record = as_rig(rig)
     if share:
         record = with_plan(record, share, "share")
-    maps = as_correspondences(as_frames(captures), record, pattern, refine, map_convention)
+    seen = KeptPhotographs()
+    maps = as_correspondences(
+        as_frames(captures), record, pattern, refine, map_convention, seen.keep
+    )
     if mask is not None:
         masks = Masks.at(Path(mask))
         maps = [masks.applied(map_) for map_ in maps]
     checkpoint = None if resume is None else load_checkpoint(resume)
-    return Result(solve(maps, record, options, progress, checkpoint), record)
+    found = solve(maps, record, options, progress, checkpoint)
+    return Result(replace(found, photographs=seen), record)
 
 
 def decode(

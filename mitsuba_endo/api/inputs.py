@@ -1,7 +1,7 @@
 """What callers bring, paths, arrays or records, as maps and a rig."""
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -24,6 +24,9 @@ FrameInput: TypeAlias = str | Path | Array | CorrespondenceMap
 record."""
 RigInput: TypeAlias = str | Path | Mapping[str, Any] | Rig
 """A rig: its file, its contents as they would stand in the file, or its record."""
+
+OnImage: TypeAlias = Callable[[str, NDArray[np.float32]], None]
+"""Called with a frame's name and its image (H, W, C), BGR or grey, 1 = full scale."""
 
 
 def as_rig(rig: RigInput) -> Rig:
@@ -57,6 +60,7 @@ def as_correspondences(
     pattern: str | None,
     refine: bool,
     map_convention: str = "",
+    on_image: OnImage | None = None,
 ) -> list[CorrespondenceMap]:
     """Return the maps of frames; images are decoded.
 
@@ -67,6 +71,7 @@ def as_correspondences(
             folder is a stack, and makes one frame.
         refine: whether decoded coordinates are refined on their images.
         map_convention: of files and arrays, a command's ``--map-convention``; records are right.
+        on_image: called with the name and pixels of every image that was decoded.
 
     Raises:
         InputError: a frame that cannot be read or is of another kind, a pattern where there
@@ -84,7 +89,7 @@ def as_correspondences(
             raise InputError("is for maps, and images are given", "map_convention", "leave it out")
         if pattern in KINDS:
             return [stack_map(path, size, pattern).map for path in paths]
-        return _decoded(images, rig, pattern, refine)
+        return _decoded(images, rig, pattern, refine, on_image)
     if pattern is not None:
         raise InputError("is for images, and maps are given", "pattern", "leave it out")
     convention = read_map_convention(map_convention)
@@ -151,7 +156,7 @@ def tell(frame: ImageFrame) -> None:
 
 
 def _decoded(
-    images: list[Path], rig: Rig, pattern: str | None, refine: bool
+    images: list[Path], rig: Rig, pattern: str | None, refine: bool, on_image: OnImage | None
 ) -> list[CorrespondenceMap]:
     """Return the maps of the images that show the pattern.
 
@@ -165,6 +170,8 @@ def _decoded(
         tell(frame)
         try:
             maps.append(decode_frame(decoder, frame))
+            if on_image is not None:
+                on_image(maps[-1].name, frame.image)
         except NothingDecodedError as error:
             failure = failure or error
     if not maps and failure is not None:

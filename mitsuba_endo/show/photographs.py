@@ -28,13 +28,64 @@ def save_photograph(path: Path, image: NDArray[np.floating]) -> None:
     Raises:
         InputError: the file cannot be written.
     """
+    with atomic_path(path) as aside:
+        aside.write_bytes(_encoded(image))
+
+
+def write_photographs(folder: Path, photographs: Mapping[str, NDArray[np.uint8]]) -> None:
+    """Write those photographs, (H, W, 3) RGB by the frame's name, that a folder does not hold yet.
+
+    Raises:
+        InputError: a file cannot be written.
+    """
+    for name in photographs:
+        path = photograph_path(folder, name)
+        if path.exists():
+            continue
+        folder.mkdir(exist_ok=True)
+        if isinstance(photographs, KeptPhotographs):
+            photographs.write(path, name)
+        else:
+            save_photograph(path, np.asarray(photographs[name][..., ::-1] / np.float32(255)))
+
+
+def _encoded(image: NDArray[np.floating]) -> bytes:
     white = max(float(np.percentile(image, _WHITE)), 1e-3)
     pixels = np.round(255 * np.clip(image / min(white, 1.0), 0, 1)).astype(np.uint8)
     pixels = np.ascontiguousarray(np.broadcast_to(pixels[..., :3], (*pixels.shape[:2], 3)))
     done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     assert done  # OpenCV's wheels hold the encoder
-    with atomic_path(path) as aside:
-        aside.write_bytes(data.tobytes())
+    return data.tobytes()
+
+
+class KeptPhotographs(Mapping[str, NDArray[np.uint8]]):
+    """Photographs in memory as JPEG, each decoded when it is asked for."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, bytes] = {}
+
+    def keep(self, name: str, image: NDArray[np.floating]) -> None:
+        """Keep a frame's image (H, W, C), BGR or grey, 1 = full scale."""
+        self._files[name] = _encoded(image)
+
+    def write(self, path: Path, name: str) -> None:
+        """Write a frame's photograph as JPEG.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        with atomic_path(path) as aside:
+            aside.write_bytes(self._files[name])
+
+    def __getitem__(self, name: str) -> NDArray[np.uint8]:
+        pixels = cv2.imdecode(np.frombuffer(self._files[name], np.uint8), cv2.IMREAD_COLOR)
+        return np.asarray(pixels, np.uint8)[..., ::-1]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._files)
+
+    def __len__(self) -> int:
+        return len(self._files)
 
 
 class StoredPhotographs(Mapping[str, NDArray[np.uint8]]):

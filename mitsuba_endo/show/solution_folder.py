@@ -23,7 +23,7 @@ from ..records.surface import MODES, SURFACE, own_surface_name, save_modes, save
 from ..records.trajectory import save_frames
 from .extras import EXTRAS, check_extras
 from .map_names import map_names, observed_names
-from .photographs import StoredPhotographs, photograph_path, save_photograph
+from .photographs import StoredPhotographs, write_photographs
 from .read_folder import DECODED, save_observed
 from .report import REPORT, save_report
 from .scene_file import save_scene
@@ -99,20 +99,11 @@ def write_solution_folder(
             save_rig(folder / "rig.yaml", rig)
         if decoded is not None:
             shutil.copytree(decoded, folder / DECODED)
-        _save_photographs(folder / DECODED, calibration)
+        write_photographs(folder / DECODED, calibration.photographs)
         photographs = StoredPhotographs(folder / DECODED, names)
         shown = replace(calibration, solution=solution, photographs=photographs)
         save_report(folder / REPORT, [(Path(path).name, shown)], [view])
     return solution
-
-
-def _save_photographs(folder: Path, calibration: Calibration) -> None:
-    """Write the photographs that a calibration brings and its folder does not hold yet."""
-    for name, image in calibration.photographs.items():
-        path = photograph_path(folder, name)
-        if not path.exists():
-            folder.mkdir(exist_ok=True)
-            save_photograph(path, np.asarray(image[..., ::-1] / np.float32(255)))
 
 
 def _save_modes(folder: Path, calibration: Calibration) -> None:

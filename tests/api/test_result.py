@@ -17,11 +17,12 @@ from mitsuba_endo.records.correspondence import CorrespondenceMap, save_map
 from mitsuba_endo.records.exr_files import read_exr
 from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.solve.options import Options
+from tests.cli.inputs import run
 from tests.decoding.grid_views import CAMERA, photo, view
 from tests.decoding.grid_views import SIZE as GRID_SIZE
 from tests.solve.views import POSE, Views, look, projector_poses, relief_surface, steps
 
-QUICK = Options(jackknife=False)
+QUICK = Options(jackknife=False, check_model=False)
 
 
 @pytest.fixture(scope="module")
@@ -170,8 +171,27 @@ def test_decode_and_calibrate_an_image(llvm: str, tmp_path: Path, grid_rig: dict
     assert not np.array_equal(plain.q, of_file.q, equal_nan=True)
     result = me.calibrate(tmp_path / "frame.png", grid_rig, options=QUICK)
     assert result.names == ["frame"]
+    assert result.calibration.photographs["frame"].shape == (*q.shape[:2], 3)
+    _same_report(result, tmp_path, grid_rig)
     with pytest.raises(NothingDecodedError):
         me.decode(np.full_like(image, 90), grid_rig)
+
+
+def _same_report(result: me.Result, folder: Path, rig: dict) -> None:
+    """Oracle: the report of the command: as many pictures, and the same photograph."""
+    (folder / "rig.yaml").write_text(yaml.safe_dump(rig), encoding="utf-8")
+    image, out = str(folder / "frame.png"), str(folder / "command")
+    run("calibrate", image, "--rig", str(folder / "rig.yaml"), "--out", out, "--quiet")
+    result.save(folder / "python")
+    kept, told = (
+        folder / name / "decoded" / "frame_photograph.jpg" for name in ("python", "command")
+    )
+    assert kept.read_bytes() == told.read_bytes()
+    mine, theirs = (
+        (folder / name / "report.html").read_text("utf-8") for name in ("python", "command")
+    )
+    for text in ('alt="photograph frame', "<img ", "Photograph, observed and rendered maps"):
+        assert mine.count(text) == theirs.count(text) > 0, text
 
 
 def test_render(llvm: str):
