@@ -13,6 +13,25 @@ SIGNALS = [
 
 
 @contextlib.contextmanager
+def as_interrupts() -> Iterator[None]:
+    """Raise KeyboardInterrupt again where a library made another error of one within the block."""
+    try:
+        yield
+    except Exception as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        raise
+
+
+def is_interrupt(error: BaseException) -> bool:
+    """Tell whether an error is an interrupt, or was made of one."""
+    link: BaseException | None = error
+    while link is not None and not isinstance(link, KeyboardInterrupt):
+        link = link.__cause__ or link.__context__
+    return link is not None
+
+
+@contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
     """Let signals that come within the block be felt at its end; in the main thread only."""
     if threading.current_thread() is not threading.main_thread():

@@ -21,6 +21,7 @@ import numpy as np
 import typer
 
 from mitsuba_endo.files import atomic_path
+from scripts.reliability.choice import chosen_by
 from scripts.reliability.readers import READERS
 from scripts.reliability.sound import VARIABLE
 
@@ -95,8 +96,12 @@ class Attempts:
 
 
 def plan(count: int, only: str | None) -> list[str]:
-    """Return the readers to try, as often as their shares say, each in one go."""
-    chosen = [r for r in READERS.values() if only is None or r.name.startswith(only)]
+    """Return the readers to try, as often as their shares say, each in one go.
+
+    Raises:
+        typer.BadParameter: no reader is called so.
+    """
+    chosen = chosen_by(only, READERS)
     shares = np.array([r.share for r in chosen])
     each = np.maximum(1, np.floor(count * shares / shares.sum())).astype(int)
     each[int(np.argmax(shares))] += max(0, count - int(each.sum()))
@@ -116,11 +121,12 @@ def main(
     out: Annotated[Path, Option(help="Folder for results.json.")] = Path("reliability-output"),
 ) -> None:
     """Parse, try, tell."""
+    names = plan(count, only)
     out.mkdir(parents=True, exist_ok=True)
     attempts, results = Attempts((out / "sound").absolute()), []
     started = time.monotonic()
     try:
-        for number, name in enumerate(plan(count, only)):
+        for number, name in enumerate(names):
             results.append(attempts(name, seed + number))
             if bad(results[-1]):
                 typer.echo(json.dumps(results[-1]))

@@ -22,6 +22,7 @@ import numpy as np
 import typer
 
 from mitsuba_endo.folder_mark import files_in, read_mark
+from scripts.reliability.choice import chosen_by
 from scripts.reliability.commands import COMMANDS, DATASET, Command, run, start
 from scripts.reliability.sound import VARIABLE
 
@@ -196,7 +197,7 @@ def main(
 ) -> None:
     """Parse, kill, tell."""
     os.environ[VARIABLE] = str((out / "sound").absolute())
-    chosen = [c for c in COMMANDS.values() if only is None or c.name.startswith(only)]
+    chosen = chosen_by(only, COMMANDS)
     rng, hits, faults = np.random.default_rng(seed), Counter[str](), list[str]()
     for k, command in enumerate(chosen):
         wanted = kills // len(chosen) + (k < kills % len(chosen))

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CAMERAS, CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
+from ..interrupts import uninterrupted
 from ..rendering import keys
 from ..rendering.axes import to_world_from_pose
 from ..rendering.mitsuba_modules import mi
 from ..rendering.synthetic import Hits, MeshScene
+from ..rendering.traced_image import traced_image
 from ..shapes.mesh import Mesh
 from .checks import check_view
 from .creases import with_creases
@@ -71,10 +73,12 @@ class PhotographScene:
             walk = {"type": "volpath", "max_depth": _LONGEST_WALK}
         self._integrator: Any = mi.load_dict(walk)
         self._direct: Any = mi.load_dict({"type": "path", "max_depth": 2})
-        self._scene: Any = mi.load_dict({
+        described = {
             "type": "scene", keys.CAMERA: _sensor(parts),
             keys.SURFACE: _surface(parts.mesh, bsdf, medium), **_lights(parts, settings.light),
-        })  # fmt: skip
+        }  # fmt: skip
+        with uninterrupted():  # of one Mitsuba makes an error of the plugin
+            self._scene: Any = mi.load_dict(described)
         self._parameters = mi.traverse(self._scene)
         self._view: _View | None = None
         self.surface = MeshScene(parts.mesh.vertices, parts.mesh.faces, self._scene)
@@ -137,8 +141,8 @@ class PhotographScene:
         self._parameters.update()
 
     def _image(self, integrator: Any, spp: int, seed: int) -> NDArray[np.float32]:
-        image = mi.render(self._scene, integrator=integrator, spp=spp, seed=seed)
-        return np.array(image, np.float32)[..., :3]
+        image = traced_image(self._scene, integrator=integrator, spp=spp, seed=seed)
+        return image[..., :3]
 
     def _spread(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         tissue, view = self._tissue, self._view

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from ..interrupts import is_interrupt
 from .entry import EXIT_INTERRUPTED, INTERRUPTED
 from .faults import internal, sentence
 
@@ -104,7 +105,7 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
     except typer.Exit:
         raise
     except (KeyboardInterrupt, Exception) as error:  # the boundary: nothing above handles it
-        if _is_interrupt(error):
+        if is_interrupt(error):
             # Caught within exec of a text (libraries build classes so), an interrupt leaves a mark
             # with which CPython ends by the signal, whatever the exit code; the next exec wipes it
             # off.
@@ -116,14 +117,6 @@ def session(quiet: bool, as_json: bool, debug: bool) -> Iterator[Session]:
         if debug:
             traceback.print_exc()
         _fail(internal(error, debug), EXIT_INTERNAL, as_json)
-
-
-def _is_interrupt(error: BaseException) -> bool:
-    """Tell Ctrl-C, also where a library that was being loaded took it for a fault of its own."""
-    link: BaseException | None = error
-    while link is not None and not isinstance(link, KeyboardInterrupt):
-        link = link.__cause__ or link.__context__
-    return link is not None
 
 
 def _fail(message: str, code: int, as_json: bool) -> NoReturn:

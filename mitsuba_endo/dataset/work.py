@@ -9,6 +9,7 @@ from typing import Literal
 
 from .. import backend
 from ..errors import InputError
+from ..interrupts import as_interrupts
 from .asset_cache import AssetCache
 from .config import Config
 from .contents import Store
@@ -73,7 +74,8 @@ def produce(job: DatasetJob, index: int) -> SampleOutcome:
     started = time.perf_counter()
     store = job.config.store
     try:
-        sample = make_sample(job.config, index, _asset_cache(job))
+        with as_interrupts():
+            sample = make_sample(job.config, index, _asset_cache(job))
         job.store().write(sample, store.radiance, store.surface)
     except InputError as error:
         status = "stop" if isinstance(error.__cause__, OSError) else "failed"

@@ -10,6 +10,7 @@ from ..geometry.transforms import RigidTransform
 from ..records.ground_truth import GroundTruth
 from . import keys
 from .scene import LoadedScene
+from .traced_image import traced_image
 from .truth import truth_of
 
 
@@ -52,10 +53,7 @@ def render_capture(loaded: LoadedScene, spp: int = 64, seed: int = 0, name: str 
     from .. import backend
 
     backend.ensure_vectorised()
-    from .mitsuba_modules import mi
-
-    sensor = loaded.sensor()
-    image = np.array(mi.render(loaded.scene, sensor=sensor, spp=spp, seed=seed), np.float32)
+    image = traced_image(loaded.scene, sensor=loaded.sensor(), spp=spp, seed=seed)
     coordinates = projector_coordinates(loaded)
     return Capture(
         image=np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[..., :3],
@@ -74,7 +72,7 @@ def projector_coordinates(loaded: LoadedScene) -> NDArray[np.float32]:
 
     settings = {"type": "projector_coords", "projector": keys.PROJECTOR}
     integrator: Any = mi.load_dict(settings)
-    return np.array(mi.render(loaded.scene, sensor=loaded.sensor(), integrator=integrator))
+    return traced_image(loaded.scene, sensor=loaded.sensor(), integrator=integrator)
 
 
 def camera_normals(loaded: LoadedScene) -> NDArray[np.float32]:

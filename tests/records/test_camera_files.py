@@ -176,6 +176,13 @@ def test_colmap_cameras(tmp_path, line, model, coefficients):
     check(camera_of(write(tmp_path / "cameras.txt", text)), model, coefficients)
 
 
+def test_colmap_sizes_of_thousands_of_digits_are_refused(tmp_path):
+    """Python turns no text of more than 4,300 digits into an integer. Oracle: one sentence."""
+    text = f"1 PINHOLE {'9' * 5000} 180 210 211 120.5 90.5\n"
+    with pytest.raises(InputError, match=r"cameras\.txt"):
+        camera_of(write(tmp_path / "cameras.txt", text))
+
+
 def test_colmaps_single_focal_length(tmp_path):
     """Oracle: f for both axes, and radial terms only."""
     path = write(tmp_path / "cameras.txt", "3 SIMPLE_RADIAL 240 180 210 120.5 90.5 -0.3\n")

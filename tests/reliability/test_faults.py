@@ -278,7 +278,10 @@ def _sleep(pipe: Path) -> None:
 
 @linux
 def test_workers_end_with_a_killed_main(tmp_path: Path):
-    """Oracle: the system's list of processes, two seconds after the main process was killed."""
+    """Oracle: the system's list of processes; a worker whose main lives would never end.
+
+    On a free machine they end within two seconds; how long to wait decides nothing.
+    """
     context = multiprocessing.get_context("spawn")
     main = context.Process(target=_sleep, args=(tmp_path / "x",))
     main.start()
@@ -287,7 +290,7 @@ def test_workers_end_with_a_killed_main(tmp_path: Path):
     _wait_for(lambda: list(tmp_path.glob("0-*")))
     os.kill(main.pid, signal.SIGKILL)
     main.join()
-    _wait_for(lambda: not any(Path(f"/proc/{pid}/cmdline").exists() for pid in workers), 2.0)
+    _wait_for(lambda: not any(Path(f"/proc/{pid}/cmdline").exists() for pid in workers))
 
 
 def _children(pid: int | None) -> list[int]:

@@ -4,6 +4,8 @@ Oracle: the files, tests and variables themselves.
 """
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,6 +27,18 @@ def test_every_command_that_is_named_is_a_module():
     named = re.findall(r"python -m (scripts\.\w+)", PAGE)
     assert len(named) == 3
     assert all((ROOT / f"{name.replace('.', '/')}.py").is_file() for name in named)
+
+
+@pytest.mark.parametrize("script", ["campaign", "kills"])
+def test_a_campaign_of_nothing_says_so(tmp_path: Path, script: str):
+    """Oracle: one sentence, the code of bad usage, and no folder."""
+    command = [sys.executable, "-m", f"scripts.reliability_{script}", "--only", "unknown"]
+    out = tmp_path / "out"
+    done = subprocess.run([*command, "--out", str(out)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "nothing begins with 'unknown'" in " ".join(done.stderr.replace("│", " ").split())
+    assert "Traceback" not in done.stderr
+    assert not out.exists()
 
 
 def test_every_limit_is_named_and_no_other():

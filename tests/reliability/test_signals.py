@@ -9,13 +9,20 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from mitsuba_endo import litter
 from mitsuba_endo.files import atomic_folder
 from mitsuba_endo.folder_mark import Kind
+from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.interrupts import as_interrupts
 from mitsuba_endo.litter import scratch_folder
+from scripts.benchmarks.plane_under_grid import plane_under_grid
+
+if TYPE_CHECKING:
+    from mitsuba_endo.capture.photograph_scene import PhotographScene
 
 
 @pytest.mark.usefixtures("llvm")
@@ -38,6 +45,77 @@ def test_an_interrupt_while_a_scene_is_loaded_is_no_fault_of_the_scene(monkeypat
     with pytest.raises(KeyboardInterrupt):
         load_scene("plane")
     assert not felt
+
+
+@pytest.mark.usefixtures("llvm")
+def test_an_interrupt_while_a_photographs_scene_is_loaded_waits(monkeypatch):
+    """As for a scene's file. Oracle: it is felt after Mitsuba's call, not within it."""
+    from mitsuba_endo.rendering.mitsuba_modules import mi
+
+    load, felt = mi.load_dict, []
+
+    def as_mitsuba(described: dict[str, object], *arguments: object, **parameters: object):
+        if described.get("type") == "scene":
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                felt.append(True)
+                raise RuntimeError('plugin of type "doe_projector"') from None
+        return load(described, *arguments, **parameters)
+
+    monkeypatch.setattr(mi, "load_dict", as_mitsuba)
+    with pytest.raises(KeyboardInterrupt):
+        _photograph_scene()
+    assert not felt
+
+
+@pytest.mark.usefixtures("llvm")
+@pytest.mark.parametrize("what", ["capture", "photograph"])
+def test_an_interrupt_while_light_is_traced_is_none_of_the_plugins(monkeypatch, what: str):
+    """Dr.Jit makes a RuntimeError of it. Oracle: Ctrl-C in the middle of the emitter's method."""
+
+    from mitsuba_endo.rendering.render import render_capture
+    from mitsuba_endo.rendering.scene import load_scene
+
+    def struck(*arguments: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    loaded = load_scene("plane", width=48, height=36)
+    # The class that this variant has: plugins are registered anew for each.
+    monkeypatch.setattr(type(loaded.emitter()), "sample_direction", struck)
+    if what == "photograph":
+        scene = _photograph_scene()
+        scene.set_poses(RigidTransform.identity(), RigidTransform.identity())
+        with pytest.raises(KeyboardInterrupt):
+            scene.trace(0)
+    else:
+        with pytest.raises(KeyboardInterrupt):
+            render_capture(loaded, spp=1)
+
+
+def test_an_interrupt_that_became_another_error_is_one_again():
+    """Oracle: the error raised, by what stands behind the one of the library."""
+    with pytest.raises(KeyboardInterrupt), as_interrupts():
+        _of_a_library(KeyboardInterrupt())
+    with pytest.raises(RuntimeError), as_interrupts():
+        _of_a_library(ValueError("a number"))
+
+
+def _of_a_library(cause: BaseException) -> None:
+    try:
+        raise cause
+    except BaseException as error:
+        raise RuntimeError("custom operation") from error
+
+
+def _photograph_scene() -> "PhotographScene":
+    from mitsuba_endo.capture.photograph_scene import PhotographScene, SceneParts
+    from mitsuba_endo.capture.settings import CaptureSettings
+
+    setup = plane_under_grid()
+    size = setup.grid.width, setup.grid.height
+    parts = SceneParts(setup.mesh, setup.camera, setup.projector, setup.grid.image(), size)
+    return PhotographScene(parts, CaptureSettings(spp=1))
 
 
 @pytest.mark.parametrize("kind", ["scratch", "output"])

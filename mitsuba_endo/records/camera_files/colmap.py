@@ -7,7 +7,8 @@ from .camera_file import CameraFile, camera_file, matrix, numbers
 from .document import Document
 from .registry import chosen, register_format
 
-_LINE = re.compile(r"^\s*(\d+)\s+([A-Z][A-Z_]+)\s+(\d+)\s+(\d+)((?:\s+[-+.\deE]+)+)\s*$")
+_LINE = re.compile(r"^\s*(\d+)\s+([A-Z][A-Z_]+)\s+(\d{1,9})\s+(\d{1,9})((?:\s+[-+.\deE]+)+)\s*$")
+"""A size of more than nine digits is none, and may be longer than Python turns into an int."""
 _PIXEL_CENTRE = 0.5
 """COLMAP's first pixel spans 0 to 1; here its centre is 0."""
 _MODELS = {
