@@ -10,6 +10,7 @@ from .acceptance import judge
 from .cells import SIDE, Image, repeated
 from .iterate import Comparison, iterate
 from .options import RefineOptions
+from .scattered_light import without_pull
 from .smoother import Smoother
 from .uncertainty import cell_covariance
 
@@ -79,6 +80,6 @@ def grow(
         added &= value > share * float(np.median(value[grown.good]))
     added &= np.maximum(covariance[..., 0], covariance[..., 2]) < KNOWN**2
     added &= frame.pattern.holds(found.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE])
-    q = np.where(repeated(added)[..., None], found.q, grown.q)
+    q = np.where(repeated(added)[..., None], without_pull(wider, found), grown.q)
     kept = np.where(added[..., None], covariance, grown.covariance)
     return Grown(q, kept, grown.good | added, grown.added | added)

@@ -15,12 +15,14 @@ from .image_view import view_of
 from .iterate import Comparison, Refined, iterate
 from .options import RefineOptions
 from .pattern_image import PatternImage
+from .scattered_light import without_pull
 from .smoother import Smoother
+from .start_smoothing import smoothed_start
 from .uncertainty import cell_covariance
 from .windows import Windows
 
 WIDER = 2.0
-"""Windows that smooth the correction over those of the regression."""
+"""Windows that smooth start and correction over those of the regression."""
 CORRELATION = 1.2
 """Standard deviation of the errors' Gaussian autocorrelation over that of the window, measured on
 photographs: 0.68 at one window's standard deviation, 0.3 at two."""
@@ -73,8 +75,8 @@ def refine_map(
             the pattern.
     """
     options = options or RefineOptions()
-    _check(start, image, pattern)
-    frame, q = _prepare(start, image, pattern, options)
+    check_start(start, image, pattern)
+    frame, q = prepare(start, image, pattern, options)
     found = iterate(frame, q, options)
     covariance = cell_covariance(frame, found)
     verdict = judge(frame, found, covariance)
@@ -86,7 +88,7 @@ def refine_map(
     return _merged(start, frame.links, grown, verdict, share, options, found.blur)
 
 
-def _check(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> None:
+def check_start(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> None:
     if image.shape[:2] != start.q.shape[:2]:
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels and the map "
@@ -106,7 +108,7 @@ def _check(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> N
         )  # fmt: skip
 
 
-def _prepare(
+def prepare(
     start: CorrespondenceMap, image: NDArray, pattern: PatternImage, options: RefineOptions
 ) -> tuple[Comparison, Image]:
     """Return what stays the same over all iterations, and the smoothed start (H, W, 2)."""
@@ -116,8 +118,8 @@ def _prepare(
     links = find_links(q)
     windows = Windows(links, options.window)
     weight = known.astype(np.float32)
-    smooth = Smoother(windows, links, weight).pixels(np.where(known[..., None], q, 0))
     wide = Smoother(Windows(links, WIDER * options.window), links, weight)
+    smooth = smoothed_start(np.where(known[..., None], q, 0), weight, links, windows, wide)
     usable = (known & view.clear).astype(np.float32)
     return Comparison(view, usable, links, windows, wide, pattern), smooth
 
@@ -126,7 +128,7 @@ def _grown(
     frame: Comparison, found: Refined, covariance: Image, verdict: Verdict, options: RefineOptions
 ) -> Grown:
     none = np.zeros_like(verdict.good)
-    grown = Grown(found.q, covariance, verdict.good, none)
+    grown = Grown(without_pull(frame, found), covariance, verdict.good, none)
     # What the start has and the image does not confirm keeps the start's coordinate.
     barred = any_in(frame.usable > 0)
     for _ in range(options.rounds):

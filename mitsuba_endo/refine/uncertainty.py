@@ -13,16 +13,16 @@ LARGEST = 1e4
 REFERENCE = 0.1**2
 """Variance, pattern pixels squared, at which a coordinate's variance is GROWTH times the linear
 one."""
-GROWTH = 5.0
+GROWTH = 4.5
 """Beside noise in one window: noise that smoothing brings from others, and errors of the start that
 are finer than a window."""
-POWER = 0.33
+POWER = 0.4
 """By which that grows with the variance: noise that moves coordinates by a part of a line's width
 does so more than linearly. Measured, with GROWTH, on 30 photographs of five kinds of scenes with
-speckle of contrast 0 to 0.8."""
-LEFT = 0.1
+speckle of contrast 0 to 0.8, and again on 10 when starts were smoothed as they are now."""
+LEFT = 0.05
 """Share of a correction that is left to do: a start's errors narrower than two windows."""
-FLOOR = 0.02
+FLOOR = 0.015
 """Standard deviation of what is finer than any window, pattern pixels."""
 
 
