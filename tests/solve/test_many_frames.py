@@ -27,7 +27,7 @@ from tests.solve.views import (
 pytestmark = pytest.mark.usefixtures("llvm")
 
 COUNT, DONE = 4, 3
-QUICK = Options(jackknife=False)
+QUICK = Options(jackknife=False, check_model=False)
 
 
 @pytest.fixture(scope="module")

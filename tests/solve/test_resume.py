@@ -21,7 +21,7 @@ from tests.solve.views import FOCAL, POSE, Views, look, projector_poses, relief_
 
 pytestmark = pytest.mark.usefixtures("llvm")
 
-QUICK = Options(jackknife=False)
+QUICK = Options(jackknife=False, check_model=False)
 SHARES = {
     "one surface": {},
     "surfaces per frame": {"surface": "per_frame", "projector_pose": "shared"},

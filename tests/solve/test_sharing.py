@@ -17,7 +17,7 @@ from tests.solve.problems import PROJECTION_MODELS, map_of, rig_file, small_rig
 from tests.solve.views import POSE, Views, focal_error, look, projector_poses
 
 pytestmark = pytest.mark.usefixtures("llvm")
-QUICK = Options(jackknife=False)
+QUICK = Options(jackknife=False, check_model=False)
 OWN = {"surface": "per_frame", "projector_pose": "per_frame"}
 
 
