@@ -22,6 +22,14 @@ function connectViewer(viewer) {
   show();
 }
 
+// A long verdict stands above the picture: what is left of the window is the picture's, unless that
+// is too little to see anything.
+function fitBelow(canvas) {
+  const top = canvas.getBoundingClientRect().top + window.scrollY;
+  const room = window.innerHeight - top - 8;
+  if (room > 300 && room < canvas.clientHeight) canvas.style.height = `${Math.floor(room)}px`;
+}
+
 function decoded(text) {
   return Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 }
@@ -73,6 +81,7 @@ function connectScene(space) {
   const surfaces = data.surfaces.map((s) => new Float32Array(decoded(s.points)));
   const patches = data.surfaces.map((s) => new Uint16Array(decoded(s.quads)));
   const colours = data.colours.map((q) => q.map((c) => new Uint8Array(decoded(c))));
+  fitBelow(canvas);
   const context = canvas.getContext("2d");
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const include = (p) => p.forEach((v, i) => {

@@ -543,7 +543,9 @@ def test_the_first_picture_needs_no_scrolling(make_calibration: Maker, tmp_path:
     from scripts.benchmarks.chromium import browser
 
     made = _with_photographs(make_calibration(width=160, height=120, count=count))
-    sentences = [f"Projector pose of frame {k}: t = (-6, 1, 2) mm." for k in range(2 * count)]
+    # As long as what is said of many frames that see too little.
+    reason = "it cannot be separated from other poses, and more depth would help; " * 4
+    sentences = [f"Projector pose of frame {k}: {reason}" for k in range(2 * count)]
     unknowns = [
         f"projector pose of frame {k} (translation {a})" for k in range(count) for a in "xyz"
     ]
