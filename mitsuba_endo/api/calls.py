@@ -26,7 +26,9 @@ from .inputs import (
     as_image,
     as_rig,
     decode_frame,
+    photographs_in,
 )
+from .photographs import calibrated_again
 from .result import Result
 
 
@@ -39,6 +41,7 @@ def calibrate(
     mask: str | Path | None = None,
     pattern: str | None = None,
     refine: bool = True,
+    second_round: bool = True,
     resume: str | Path | None = None,
     progress: Callable[[float, str], None] | None = None,
     options: Options | None = None,
@@ -56,7 +59,10 @@ def calibrate(
         pattern: in the images; default the coded grid. With ``stack``, ``gray``, ``phase`` or
             ``gray+phase`` each folder is a stack of photographs, and makes one frame.
         refine: whether decoded coordinates are refined on their images.
-        resume: folder of an earlier calibration of these frames to go on with.
+        second_round: whether images are read again along the epipolar lines of their calibration,
+            and calibrated again if a tenth of the coordinates comes or goes. Not with ``resume``.
+        resume: folder of an earlier calibration of these frames to go on with; it needs the very
+            maps that one ended with, which after a second round are its ``observed.exr``.
         progress: called with the share of the work done and the name of the step.
         options: how to solve.
 
@@ -67,15 +73,19 @@ def calibrate(
     record = as_rig(rig)
     if share:
         record = with_plan(record, share, "share")
-    seen = KeptPhotographs()
-    maps = as_correspondences(
-        as_frames(captures), record, pattern, refine, map_convention, seen.keep
-    )
-    if mask is not None:
-        masks = Masks.at(Path(mask))
+    frames, seen = as_frames(captures), KeptPhotographs()
+    maps = as_correspondences(frames, record, pattern, refine, map_convention, seen.keep)
+    masks = Masks.at(Path(mask)) if mask is not None else None
+    if masks:
         maps = [masks.applied(map_) for map_ in maps]
     checkpoint = None if resume is None else load_checkpoint(resume)
     found = solve(maps, record, options, progress, checkpoint)
+    images = photographs_in(frames, pattern) if refine and second_round and not checkpoint else []
+    if images:
+        more: dict[str, Any] = {"masked": masks.applied} if masks else {}
+        if progress:
+            more["say"] = progress
+        found = calibrated_again(found, maps, images, pattern, record, options, more)
     return Result(replace(found, photographs=seen), record)
 
 

@@ -102,6 +102,14 @@ def as_correspondences(
     ]  # fmt: skip
 
 
+def photographs_in(captures: Iterable[FrameInput], pattern: str | None) -> list[Path]:
+    """Return the images of the coded grid among the frames of captures."""
+    if pattern in KINDS:
+        return []
+    frames = (frame for k, capture in enumerate(captures) for frame in _frames(capture, k))
+    return [frame for frame in frames if isinstance(frame, Path) and is_images(frame)]
+
+
 def _frames(capture: FrameInput, index: int) -> list[Path | Array | CorrespondenceMap]:
     """Return the frames of a capture: of a folder of maps, each."""
     if isinstance(capture, CorrespondenceMap | np.ndarray):

@@ -11,6 +11,7 @@ from .decode import Refine
 from .live import watching
 from .map_options import MapConvention, Mask
 from .options import names_in
+from .second_round import Photographs, SecondRound, keep_earlier_maps
 
 if TYPE_CHECKING:
     from ..records.checkpoint import Checkpoint
@@ -129,6 +130,7 @@ def calibrate(
     resume: Resume = None,
     pattern: PatternOrStack = None,
     refine: Refine = True,
+    second_round: SecondRound = True,
     live: Live = False,
     save: Save = "",
     quiet: Quiet = False,
@@ -138,13 +140,15 @@ def calibrate(
     """Find projector pose, focal length and surface from correspondence maps.
 
     Images of the coded grid are decoded and refined first, as by the command decode; their maps and
-    pictures of the grids found go into the folder "decoded" of the solution. With --pattern stack
+    pictures of the grids found go into the folder "decoded" of the solution. A second round reads
+    them again along the epipolar lines of the first calibration. With --pattern stack
     each folder is a stack of Gray code or shifted fringes, decoded as by decode-stack.
     """
     from ..litter import scratch_folder
 
     with session(quiet, as_json, debug) as output, scratch_folder() as aside:
         from ..decoding.frame_files import frame_files
+        from ..decoding.stack_map import KINDS as STACKS
         from ..folder_mark import Kind
         from ..outputs import prepare_folder
         from ..records.checkpoint import load_checkpoint
@@ -158,6 +162,11 @@ def calibrate(
         files = frame_files(maps)
         paths = decode_images(files, rig, pattern, refine, aside, output, map_convention)
         decoded = aside if any(aside.iterdir()) else None
+        if resume is not None and decoded:
+            keep_earlier_maps(aside, resume)
+        again = None
+        if refine and second_round and resume is None and decoded and pattern not in STACKS:
+            again = Photographs(files, pattern, aside, mask, output)
         frames, rig_record = load_input(paths, rig, share, output.print, map_convention, mask)
         options = Options(
             solver=solver, surface=surface, start=start, check_model=check_model, seed=seed
@@ -165,7 +174,7 @@ def calibrate(
         with watching(live, rig_record, output) as watch:
             show = watch and watch.view.show
             solution = solve_and_write(
-                frames, rig_record, options, out, output, checkpoint, show, decoded, extras
+                frames, rig_record, options, out, output, checkpoint, show, decoded, extras, again
             )
             report(solution, out, output)
             if watch:
@@ -262,8 +271,12 @@ def solve_and_write(
     observe: "Observe | None" = None,
     decoded: Path | None = None,
     extras: Sequence[str] = (),
+    photographs: Photographs | None = None,
 ) -> "Solution":
-    """Calibrate with a progress bar, write the solution folder and return what it says."""
+    """Calibrate with a progress bar, write the solution folder and return what it says.
+
+    With photographs there is a second round.
+    """
     with output.progress("Starting Mitsuba") as advance:
         from .. import backend
 
@@ -271,9 +284,19 @@ def solve_and_write(
         from ..show.solution_folder import write_solution_folder
         from ..solve.calibrate import calibrate as solve
 
-        result = solve(maps, rig, options, advance, resume, observe)
+        part = 0.5 if photographs else 1.0
+        result = solve(maps, rig, options, _part(advance, 0.0, part), resume, observe)
+        if photographs:
+            rest = _part(advance, part, 0.95 - part)
+            result = photographs.calibrated_again(result, maps, rig, options, rest, observe)
         advance(0.95, "Drawing pictures")
         return write_solution_folder(out, result, rig, decoded, extras)
+
+
+def _part(
+    advance: Callable[[float, str], None], begin: float, length: float
+) -> Callable[[float, str], None]:
+    return lambda share, step: advance(begin + length * share, step)
 
 
 def exit_code(solution: "Solution") -> int:

@@ -48,17 +48,24 @@ def decoded_map(
     if not refine or decoded.reason:
         return DecodedMap(plain, decoded.confidence, None)
     found = refine_map(plain, image, grid_image(grid))
-    return DecodedMap(found.map, _confidence(decoded, found.map, grid.period), found)
+    confidence = confidence_of(found.map, decoded.confidence, grid.period)
+    return DecodedMap(found.map, confidence, found)
 
 
-def _confidence(
-    decoded: DecodedGrid, map_: CorrespondenceMap, period: float
+def confidence_of(
+    map_: CorrespondenceMap, before: NDArray[np.floating], period: float
 ) -> NDArray[np.float32]:
-    """Return the decoder's confidence, and from the covariance that of pixels it had not."""
-    confidence = np.where(map_.valid, decoded.confidence, 0)
+    """Return the confidences (H, W) of a refined map.
+
+    Args:
+        map_: refined.
+        before: (H, W) the decoder's, 0 where it found nothing; there the covariance gives it.
+        period: of the pattern, pattern pixels.
+    """
+    confidence = np.where(map_.valid, before, 0)
     if map_.covariance is None:
         return confidence.astype(np.float32)
-    grown = map_.valid & (decoded.confidence == 0)
+    grown = map_.valid & (before == 0)
     spread = np.sqrt(2 * map_.covariance[grown][:, [0, 2]])
     confidence[grown] = erf(RIGHT * period / spread).prod(-1)
     return confidence.astype(np.float32)

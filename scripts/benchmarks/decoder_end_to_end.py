@@ -63,8 +63,8 @@ def judge(kind: Kind, mesh: Mesh, shots: Sequence[Shot], network: Network) -> li
     noise = float(np.median([_noise(m.q, shot) for m, shot in zip(read, shots, strict=True)]))
     white, alike = ([_noisy(shot, noise, spread, seed) for seed, shot in enumerate(shots)]
                     for spread in (0.0, CORRELATION_PX))  # fmt: skip
-    focal, shape, frames = _calibrated(mesh, shots, read)
-    ideal, matched = (_calibrated(mesh, shots, maps)[1] for maps in (white, alike))
+    focal, shape, frames = calibrated_jointly(mesh, shots, read)
+    ideal, matched = (calibrated_jointly(mesh, shots, maps)[1] for maps in (white, alike))
     return [
         _figure(
             f"{kind}: decoder's noise, robust standard deviation", noise, "pattern px", "lower"
@@ -94,7 +94,7 @@ def _noisy(shot: Shot, noise: float, spread: float, seed: int) -> Correspondence
     return CorrespondenceMap((q + noise * error / error.std()).astype(np.float32), "")
 
 
-def _calibrated(
+def calibrated_jointly(
     mesh: Mesh, shots: Sequence[Shot], maps: Sequence[CorrespondenceMap]
 ) -> tuple[float, float, int]:
     """Return the focal length's error, %, the shape's RMSE, mm, and the frames used."""

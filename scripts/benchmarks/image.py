@@ -3,9 +3,12 @@
 Photographs of five kinds of scenes with seeds that neither training nor tuning saw, each clean,
 with speckle of contrast 0.25, and heavily corrupted (decoder_scenes.py). Ratios are refined over
 decoded, geometric means over photographs; below 1 is better. The first seeds' maps are calibrated
-too, one by one.
+too, one by one: decoded, refined, and after the second round.
+
+python -m scripts.benchmarks.image SEED... prints the figures of maps of these seeds alone.
 """
 
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -23,15 +26,18 @@ from mitsuba_endo.refine.pattern_image import grid_image
 from mitsuba_endo.refine.refine_map import RefinedMap, refine_map
 
 from .decoder_scenes import BRIGHT, KINDS, PATTERN, Kind, Shot, compare
-from .image_calibration import Accuracy, calibrated
+from .image_calibration import Accuracy, Calibrations, all_calibrated
+from .image_joint import joint_figures
 from .photograph_cache import cached_shot
 from .report import Figure, timed
 
 NAME = "image"
 _figure = partial(Figure, NAME)
 SEEDS = range(801, 809)
-CALIBRATED = 2
+CALIBRATED = 4
 """Seeds of each kind whose maps are calibrated: that takes far longer than all else."""
+CALIBRATED_COLONS = 8
+"""Of colons all are, for the coverage after a second round."""
 CONDITIONS = ("clean", "moderate", "heavy")
 SMOOTH_PX = 15.0
 """Standard deviation of the Gaussian over which errors are averaged: the smooth error."""
@@ -49,6 +55,7 @@ class Case:
     seed: int
     condition: str
     shot: Shot
+    image: NDArray[np.uint8]
     visible: NDArray[np.bool_]
     decoded: CorrespondenceMap
     refined: RefinedMap
@@ -61,7 +68,7 @@ def run(quick: bool) -> list[Figure]:
     for condition in CONDITIONS:
         cases = [case for seed in seeds for case in _cases(network, seed, condition, quick)]
         figures += [*_map_figures(condition, cases), *_calibration_figures(condition, cases)]
-    return [*figures, *_seconds(network, quick)]
+    return [*figures, *joint_figures(network, quick), *_seconds(network, quick)]
 
 
 def _cases(network: Network, seed: int, condition: str, quick: bool) -> Iterator[Case]:
@@ -77,7 +84,7 @@ def judge(network: Network, kind: Kind, seed: int, condition: str, shot: Shot) -
     found = decode_image(image, network, PATTERN)
     decoded = CorrespondenceMap(found.q, f"{kind} {seed}", found.weight)
     refined = refine_map(decoded, image, grid_image(PATTERN))
-    return Case(kind, seed, condition, shot, visible, decoded, refined)
+    return Case(kind, seed, condition, shot, image, visible, decoded, refined)
 
 
 def photograph_of(
@@ -162,25 +169,53 @@ def _rms(q: NDArray[np.floating], case: Case) -> float:
     return float(np.sqrt(np.mean(error[(error < GROSS).all(1)] ** 2)))
 
 
+def calibrations_of(case: Case) -> Calibrations:
+    """Calibrate from a photograph's maps, once."""
+    size = f"{case.shot.camera.width}x{case.shot.camera.height}"
+    name = f"{case.kind}_{case.seed}_{case.condition}_{size}"
+    return all_calibrated(name, case.kind, case.seed, case.shot, case.visible, case.image,
+                          case.decoded, case.refined.map)  # fmt: skip
+
+
+def chosen(case: Case) -> bool:
+    """Tell whether a photograph is calibrated."""
+    count = CALIBRATED_COLONS if case.kind == "colon" else CALIBRATED
+    return case.seed - SEEDS[0] < count
+
+
 def _calibration_figures(condition: str, cases: Sequence[Case]) -> Iterator[Figure]:
-    chosen = [c for c in cases if c.seed - SEEDS[0] < CALIBRATED]
-    pairs = [(calibrated(c.decoded, c.kind, c.seed, c.shot),
-              calibrated(c.refined.map, c.kind, c.seed, c.shot)) for c in chosen]  # fmt: skip
+    found = {(c.kind, c.seed): calibrations_of(c) for c in cases if chosen(c)}
+    judged = [f for (_, seed), f in found.items() if seed - SEEDS[0] < CALIBRATED]
     limit, worst = (0.8, 1.2) if condition == "heavy" else (0.35, 1.3)
-    name = f"{condition}, {len(pairs)} calibrations"
+    name = f"{condition}, {len(judged)} calibrations"
     for what in Accuracy.__dataclass_fields__:
-        plain, better = (np.array([getattr(p[k], what) for p in pairs]) for k in (0, 1))
-        ratio = better / plain
+        plain, *better = (np.array([getattr(getattr(f, which), what) for f in judged])
+                          for which in ("decoded", "refined", "second"))  # fmt: skip
         aim = limit if what != "range_mm" or condition == "heavy" else 0.5
-        yield _figure(f"{name}: {what}, decoded, median", float(np.median(plain)), "", "lower")
-        yield _figure(f"{name}: {what}, refined, median", float(np.median(better)), "", "lower")
-        yield _figure(f"{name}: {what}", _mean(ratio), "of the decoder's", "lower", aim)
-        yield _figure(f"{name}: {what}, worst", float(ratio.max()), "of the decoder's", "lower",
-                      worst)  # fmt: skip
+        yield _figure(f"{name}: {what}, decoded, median", float(np.nanmedian(plain)), "", "lower")
+        for which, value in zip(("refined", "second round"), better, strict=True):
+            ratio = value / plain
+            yield _figure(
+                f"{name}: {what}, {which}, median", float(np.nanmedian(value)), "", "lower"
+            )
+            yield _figure(f"{name}: {what}, {which}", _mean(ratio), "of the decoder's", "lower",
+                          aim)  # fmt: skip
+            yield _figure(f"{name}: {what}, {which}, worst", float(np.nanmax(ratio)),
+                          "of the decoder's", "lower", worst)  # fmt: skip
+    yield from _second_coverage(condition, [f for (kind, _), f in found.items() if kind == "colon"])
+
+
+def _second_coverage(condition: str, colons: Sequence[Calibrations]) -> Iterator[Figure]:
+    lit, read, wrong = (sum(getattr(f, k) for f in colons) for k in ("lit", "read", "wrong"))
+    name, heavy = f"{condition} colon, second round", condition == "heavy"
+    yield _figure(f"{name}: coverage of lit pixels", 100 * read / lit, "%", "higher",
+                  75 if heavy else None)  # fmt: skip
+    yield _figure(f"{name}: wrong period", 100 * wrong / read, "%", "lower", 1 if heavy else None)
 
 
 def _mean(ratios: NDArray[np.float64]) -> float:
-    return float(np.exp(np.mean(np.log(ratios))))
+    """Return the geometric mean, without photographs of which one map leaves the value open."""
+    return float(np.exp(np.nanmean(np.log(ratios))))
 
 
 def _seconds(network: Network, quick: bool) -> Iterator[Figure]:
@@ -191,3 +226,12 @@ def _seconds(network: Network, quick: bool) -> Iterator[Figure]:
     run_once = partial(refine_map, case.decoded, image, grid_image(PATTERN))
     seconds = [timed(run_once)[0] for _ in range(3 if quick else 8)]
     yield _figure("640 x 480 colon, fastest of 8", min(seconds), "s", "lower", 0.3)
+
+
+if __name__ == "__main__":
+    decoder = load_network()
+    given = [int(text) for text in sys.argv[1:]]
+    for kind_of_light in CONDITIONS:
+        judged = [c for seed in given for c in _cases(decoder, seed, kind_of_light, quick=False)]
+        for figure in _map_figures(kind_of_light, judged):
+            print(figure, flush=True)

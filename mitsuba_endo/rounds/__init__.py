@@ -1,0 +1,1 @@
+"""Photographs calibrated, read again with what the calibration says, and calibrated anew."""
