@@ -1,8 +1,9 @@
 """Benchmarks: pairs measured in one run, printed with unit and direction, and saved.
 
-python scripts/benchmark.py --out benchmark-output [--only NAME]... [--quick]
+python scripts/benchmark.py --out benchmark-output [--only NAME]... [--add] [--quick]
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -31,7 +32,7 @@ from benchmarks import (
     stacks,
     verdicts,
 )
-from benchmarks.report import Figure, save, show
+from benchmarks.report import Figure, renewed, save, saved, show
 from rich.console import Console
 
 from mitsuba_endo import backend
@@ -65,30 +66,46 @@ BENCHMARKS = {
 }
 
 
+RUNS: dict[str, Callable[[bool], list[Figure]]] = {
+    **{name: module.run for name, module in BENCHMARKS.items()},
+    **{f"{sequence.NAME}/{part}": run for part, run in sequence.PARTS.items()},
+}
+"""Whole benchmarks, and parts of long ones."""
+
+
 def main(
     out: Annotated[Path, typer.Option(help="Folder for benchmark.json and benchmark.csv.")] = Path(
         "benchmark-output"
     ),
     only: Annotated[
-        list[str] | None, typer.Option(help=f"Run these alone: {', '.join(BENCHMARKS)}.")
+        list[str] | None, typer.Option(help=f"Run these alone: {', '.join(RUNS)}.")
     ] = None,
+    add: Annotated[
+        bool, typer.Option(help="Keep figures in the folder that are not measured anew.")
+    ] = False,
     quick: Annotated[bool, typer.Option(help="Small inputs, to see that it runs.")] = False,
 ) -> None:
     """Run the benchmarks and report their figures."""
-    unknown = set(only or ()) - set(BENCHMARKS)
+    unknown = set(only or ()) - set(RUNS)
     if unknown:
         raise typer.BadParameter(f"no benchmark {', '.join(sorted(unknown))}", param_hint="--only")
     backend.use()
     console = Console()
     figures: list[Figure] = []
     for name in only or BENCHMARKS:
-        console.print(f"[bold]{name}[/]: {(BENCHMARKS[name].__doc__ or '').splitlines()[0]}")
-        figures += BENCHMARKS[name].run(quick)
+        console.print(f"[bold]{name}[/]: {_about(name)}")
+        figures += RUNS[name](quick)
     if not figures:
         console.print("Nothing was measured: the input of these benchmarks is absent.")
         return
     show(figures, console)
-    save(figures, out)
+    save(renewed(saved(out), figures) if add else figures, out)
+
+
+def _about(name: str) -> str:
+    """Return the first line of what a benchmark says of itself."""
+    told = BENCHMARKS[name].__doc__ if name in BENCHMARKS else RUNS[name].__doc__
+    return (told or "").splitlines()[0]
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ and ICP; here the package's own registration does it, and small_gicp's ICP where
 """
 
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Annotated
 
@@ -16,19 +16,24 @@ import typer
 from numpy.typing import NDArray
 
 from mitsuba_endo import backend
-from mitsuba_endo.evaluate.trajectory_errors import absolute_trajectory_error, trajectory_alignment
+from mitsuba_endo.evaluate.sequence_errors import evaluate_sequence
+from mitsuba_endo.evaluate.sequence_metrics import SequenceMetrics
+from mitsuba_endo.evaluate.tracked_frames import TrackedFrames
+from mitsuba_endo.fusion import RangeFrame, fuse
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.initialisation.range_image import RangeImage
 from mitsuba_endo.initialisation.registration import register_frames
-from mitsuba_endo.records.calibration import SurfaceEstimate
+from mitsuba_endo.records.calibration import Calibration, SurfaceEstimate
+from mitsuba_endo.records.trajectory import FrameRow
+from mitsuba_endo.sequence.outcome import outcome_of
 from mitsuba_endo.sequence.run import run_sequence
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 from scripts.reproduce.fusion import Fusion, _icp
 from tests.sequences import Recording, withdrawal
 
-Poses = dict[int, RigidTransform]
-"""world_from_camera of the frames that a method placed, by their numbers."""
+MOST = 16
+"""Frames that are calibrated together, spread over all."""
 LEAN = Options(jackknife=False, check_model=False)
 
 
@@ -40,44 +45,84 @@ def main(
     """Print how far each method's cameras are from the truth."""
     backend.use("llvm_ad_rgb")
     recording = withdrawal(frames, step=step, seed=seed)
-    methods: dict[str, Callable[[Recording], Poses]] = {
-        "sequence": tracked, "calibrate, one mesh": jointly, "frame by frame, registered": alone,
-    }  # fmt: skip
-    for name, method in methods.items():
+    for name, method in METHODS.items():
         began = perf_counter()
-        poses = method(recording)
-        told = _errors(poses, recording) if len(poses) >= 3 else "too few to compare"
+        found = method(recording)
         seconds = perf_counter() - began
-        typer.echo(f"{name}: {len(poses)} of {frames} frames, {told}, {seconds:.0f} s")
+        if len(found.placed) < 3:
+            typer.echo(f"{name}: {len(found.placed)} frames, too few to compare, {seconds:.0f} s")
+            continue
+        m = errors(found, recording)
+        typer.echo(
+            f"{name}: {m.frames} of {frames} frames, {m.ate_aligned_rms_mm:.3f} mm aligned, "
+            f"{m.ate_first_rms_mm:.3f} mm with first cameras put together, surface "
+            f"{m.surface_rms_mm:.3f} mm of {m.completeness_percent:.0f} %, {seconds:.0f} s"
+        )
 
 
-def tracked(recording: Recording) -> Poses:
-    rows = run_sequence(recording.maps(), recording.rig()).rows
-    return {r.number: r.world_from_camera for r in rows if r.world_from_camera is not None}
+def errors(found: TrackedFrames, recording: Recording) -> SequenceMetrics:
+    """Compare what a method placed with the truth."""
+    return evaluate_sequence(found, recording.truth, recording.surface)
 
 
-def jointly(recording: Recording) -> Poses:
+def tracked(recording: Recording) -> TrackedFrames:
+    result = outcome_of(run_sequence(recording.maps(), recording.rig()))
+    mesh = result.surfaces[result.main]
+    surface = None if mesh is None else SurfaceEstimate(mesh.vertices, mesh.faces, mesh.std)
+    return TrackedFrames(result.solution, result.rows, surface)
+
+
+def jointly(recording: Recording) -> TrackedFrames:
+    count = len(recording)
+    chosen = np.unique(np.linspace(0, count - 1, min(MOST, count)).astype(int)).tolist()
     options = Options(surface="mesh", jackknife=False, check_model=False)
-    found = calibrate(list(recording.maps()), recording.rig(), options).solution
-    poses = {int(f.name[5:]): f.world_from_camera.to_transform() for f in found.frames}
-    return {k: pose for k, pose in poses.items() if pose is not None}
+    found = calibrate(list(recording.maps(chosen)), recording.rig(), options)
+    frames = found.solution.frames
+    rows = [
+        FrameRow(int(frame.name[5:]), frame.name,
+                 world_from_camera=frame.world_from_camera.to_transform(),
+                 projector_from_camera=frame.projector_from_camera.to_transform())
+        for frame in frames
+    ]  # fmt: skip
+    return TrackedFrames(found.solution, rows, found.surface)
 
 
-def alone(recording: Recording) -> Poses:
+def alone(recording: Recording) -> TrackedFrames:
     """Solve A; the scale of each frame is that of the one baseline given for all."""
     from scripts.reproduce.methods import _range
 
     rig = recording.rig(drift=None)
     found = [calibrate([m], rig, LEAN) for m in recording.maps()]
-    surfaces: list[SurfaceEstimate] = [f.surface for f in found]
     camera = recording.camera
-    ranges = [_range(s, camera) for s in surfaces]
+    ranges = [_range(f.surface, camera) for f in found]
+    poses = _registered(ranges, recording)
+    frames = [RangeFrame(ranges[k], camera, pose) for k, pose in poses.items()]
+    mesh = fuse(frames)
+    rows = [
+        FrameRow(k, f"frame{k:04d}", world_from_camera=pose,
+                 projector_from_camera=_projector(found[k]))
+        for k, pose in poses.items()
+    ]  # fmt: skip
+    return TrackedFrames(found[0].solution, rows, SurfaceEstimate(mesh.vertices, mesh.faces))
+
+
+METHODS: dict[str, Callable[[Recording], TrackedFrames]] = {
+    "sequence": tracked,
+    "calibrate, one mesh": jointly,
+    "frame by frame, registered": alone,
+}
+
+
+def _registered(
+    ranges: Sequence[NDArray[np.float64]], recording: Recording
+) -> dict[int, RigidTransform]:
+    """Return world_from_camera of the frames that registration places, refined by ICP."""
+    camera = recording.camera
     rays = camera.grid_rays
     placed = register_frames([RangeImage(rays, r, camera) for r in ranges])
-    poses: Poses = {}
+    poses: dict[int, RigidTransform] = {}
     clouds = [_points(rays, r) for r in ranges]
-    model = clouds[0]
-    first = placed[0]
+    model, first = clouds[0], placed[0]
     for k, at in enumerate(placed):
         if not at.reliable:
             continue
@@ -90,21 +135,12 @@ def alone(recording: Recording) -> Poses:
     return poses
 
 
+def _projector(found: Calibration) -> RigidTransform | None:
+    return found.solution.frames[0].projector_from_camera.to_transform()
+
+
 def _points(rays: NDArray[np.float64], ranges: NDArray[np.float64]) -> NDArray[np.float64]:
     return (rays * ranges[..., None])[np.isfinite(ranges)]
-
-
-def _errors(poses: Poses, recording: Recording) -> str:
-    found = list(poses.values())
-    true = [recording.world_from_camera[k] for k in poses]
-    parts = []
-    for how in ("rigid", "none"):
-        by = trajectory_alignment(found, true, how)
-        rms = np.sqrt(np.mean(absolute_trajectory_error(found, true, by) ** 2))
-        parts.append(
-            f"{rms:.3f} mm {'aligned' if how == 'rigid' else 'with first cameras put together'}"
-        )
-    return ", ".join(parts)
 
 
 if __name__ == "__main__":

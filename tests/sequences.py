@@ -17,10 +17,14 @@ from numpy.typing import NDArray
 from mitsuba_endo import backend
 from mitsuba_endo.geometry import trajectories
 from mitsuba_endo.geometry.cameras import CameraModel
+from mitsuba_endo.geometry.endoscope import Endoscope
 from mitsuba_endo.geometry.projection_models import ProjectorModel, projector_model
 from mitsuba_endo.geometry.transforms import RigidTransform
+from mitsuba_endo.records.calibration import SurfaceEstimate
 from mitsuba_endo.records.correspondence import CorrespondenceMap
+from mitsuba_endo.records.ground_truth import GroundTruth, TrueFrame
 from mitsuba_endo.records.rig import Camera, Rig
+from mitsuba_endo.records.solution import Solution
 from mitsuba_endo.shapes import Mesh, make_shape
 from scripts.reproduce.decoder_noise import DecoderNoise
 from tests.lumen import CENTRE, FOCAL, POSE, REACH, SIZE, endoscope
@@ -71,6 +75,21 @@ class Recording:
     def maps(self, only: Sequence[int] | None = None) -> Iterator[CorrespondenceMap]:
         """Yield the maps, one after the other."""
         yield from (self.map(k) for k in (range(len(self)) if only is None else only))
+
+    @property
+    def truth(self) -> Solution:
+        """What ``evaluate`` compares with; the world is the first camera."""
+        poses = zip(self.world_from_camera, self.projector_from_camera, strict=True)
+        frames = [
+            TrueFrame(f"frame{k:04d}", Endoscope(self.camera, at, self.projector, own))
+            for k, (at, own) in enumerate(poses)
+        ]
+        return GroundTruth(frames, SIZE).to_solution()
+
+    @property
+    def surface(self) -> SurfaceEstimate:
+        """The true one, without deviations."""
+        return SurfaceEstimate(self.mesh.vertices.astype(float), self.mesh.faces)
 
     def rig(self, **changes: object) -> Rig:
         """A rig file that knows camera, pattern, first baseline and how the projector drifts."""

@@ -25,6 +25,7 @@ SEQUENCE_METRICS = {
     "rpe_turn_rms_deg": ("turns over 10 frames, RMS", "deg"),
     "last_to_first_mm": ("last frame against the first", "mm"),
     "scale_error_percent": ("scale of the way", "%"),
+    "scale_worst_percent": ("the same, worst of 100 frames in a row", "%"),
     "focal_error_percent": ("focal length", "%"),
     "surface_rms_mm": ("surface distance, aligned, RMS", "mm"),
     "surface_median_mm": ("surface distance, aligned, median", "mm"),
@@ -32,6 +33,7 @@ SEQUENCE_METRICS = {
     "completeness_percent": ("seen surface found within 1 mm", "%"),
     "camera_intervals_percent": ("95 % intervals of camera poses that hold the truth", "%"),
     "projector_intervals_percent": ("95 % intervals of projector poses that do", "%"),
+    "vertex_intervals_percent": ("95 % intervals of vertices that do", "%"),
 }
 """What of :class:`SequenceMetrics` is shown, with the unit."""
 INTERVAL_COLUMN = "± (95 %)"

@@ -15,6 +15,9 @@ from .sequence_surface import TrackedViews
 from .tracked_frames import PosePairs, TrackedFrames
 from .trajectory_errors import absolute_trajectory_error, trajectory_alignment
 
+SCALE_ERRORS = ("scale_error_percent", "scale_worst_percent")
+"""Nothing where the scale is not known."""
+
 
 def evaluate_sequence(
     found: TrackedFrames, truth: Solution, true_surface: SurfaceEstimate | None
@@ -54,7 +57,7 @@ def evaluate_sequence(
         ate_aligned_max_mm=float(aligned.max()),
         ate_first_rms_mm=ours.first_error() if in_mm else None,
         **ours.motions(by.scale),
-        scale_error_percent=ours.scale_error() if in_mm else None,
+        **(ours.scale_errors() if in_mm else dict.fromkeys(SCALE_ERRORS)),
         focal_error_percent=focal.value,
         camera_intervals_percent=ours.held("camera") if in_mm else None,
         projector_intervals_percent=ours.held("projector") if in_mm else None,

@@ -36,6 +36,8 @@ class SequenceMetrics(Record):
     """The same of the motion from the first frame to the last: how well a loop closes."""
     scale_error_percent: float | None
     """100 (length of the way / its true length - 1), from the best similarity; signed."""
+    scale_worst_percent: float | None
+    """The same of those :data:`.tracked_frames.WINDOW` frames in a row that have the largest."""
     focal_error_percent: float | None
     surface_rms_mm: float | None
     """Distance of the found surface's vertices from the true one, aligned by the cameras' poses,
@@ -43,6 +45,9 @@ class SequenceMetrics(Record):
     surface_median_mm: float | None
     surface_first_rms_mm: float | None
     """The same as ``surface_rms_mm`` with the first cameras put together instead."""
+    vertex_intervals_percent: float | None
+    """Share of the 95 % intervals of the surface's vertices, along their normals, that hold the
+    true surface, the first cameras put together."""
     completeness_percent: float | None
     """Share of the true surface that frames saw lit with the found one within 1 mm."""
     camera_intervals_percent: float | None

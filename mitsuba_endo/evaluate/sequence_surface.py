@@ -10,7 +10,7 @@ from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import SurfaceEstimate
-from ..records.solution import Solution
+from ..records.solution import INTERVAL, Solution
 from .alignment import Similarity, align
 from .depth import RayCaster
 from .distance import distance_to_mesh
@@ -52,7 +52,7 @@ class TrackedViews:
         """Return errors of the surface and its completeness."""
         names = ("surface_rms_mm", "surface_median_mm", "completeness_percent")
         if self._surface is None or self._true is None:
-            return dict.fromkeys((*names, "surface_first_rms_mm"))
+            return dict.fromkeys((*names, "surface_first_rms_mm", "vertex_intervals_percent"))
         plain = self._pair.base.apply(self._surface.vertices)
         vertices = self._by.apply(plain)
         rng = np.random.default_rng(0)
@@ -65,7 +65,17 @@ class TrackedViews:
         return {
             **dict(zip(names, values, strict=True)),
             "surface_first_rms_mm": root_mean_square(first) if self._in_mm else None,
+            "vertex_intervals_percent": self._held(first, few) if self._in_mm else None,
         }
+
+    def _held(self, off: Floats, vertices: NDArray[np.int64]) -> float | None:
+        """Return the share, %, of some vertices' 95 % intervals that hold the true surface."""
+        assert self._surface is not None
+        if self._surface.std is None:
+            return None
+        std = self._surface.std[vertices]
+        known = np.isfinite(std)
+        return 100 * float((off < INTERVAL * std)[known].mean()) if known.any() else None
 
     def depth(self) -> list[FrameDepth]:
         """Return of some frames how the depth of their pixels differs."""

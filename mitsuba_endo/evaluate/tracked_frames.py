@@ -18,6 +18,8 @@ from .trajectory_errors import absolute_trajectory_error, relative_pose_error, t
 
 APART = 10
 """Frames over which motions are compared."""
+WINDOW = 100
+"""Frames in a row over which the scale is compared, every half of as many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +71,17 @@ class PosePairs:
             "last_to_first_mm": float(end[0]),
         }
 
-    def scale_error(self) -> float:
-        by = trajectory_alignment(self.found, self.true, "similarity")
+    def scale_errors(self) -> dict[str, Any]:
+        """Return how much too long the way is, and the part of it with the largest error, %."""
+        starts = range(0, max(len(self.found) - WINDOW, 0) + 1, WINDOW // 2)
+        parts = [self._scale_error(slice(k, k + WINDOW)) for k in starts]
+        return {
+            "scale_error_percent": self._scale_error(slice(None)),
+            "scale_worst_percent": max(parts, key=abs),
+        }
+
+    def _scale_error(self, frames: slice) -> float:
+        by = trajectory_alignment(self.found[frames], self.true[frames], "similarity")
         return 100 * (1 / by.scale - 1)
 
     def held(self, what: str) -> float | None:

@@ -4,8 +4,11 @@ import csv
 import json
 import os
 import platform
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from importlib import metadata
 from pathlib import Path
 from time import perf_counter
@@ -108,6 +111,30 @@ def markdown(figures: Sequence[Figure]) -> str:
     rows = [["benchmark", *HEADINGS], ["---"] * (len(HEADINGS) + 1)]
     rows += [[f.benchmark, *_cells(f)] for f in figures]
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def saved(out: Path) -> list[Figure]:
+    """Return the figures that :func:`save` wrote into a folder; none if it did not."""
+    path = out / "benchmark.json"
+    if not path.is_file():
+        return []
+    rows = json.loads(path.read_text("utf-8"))["figures"]
+    return [Figure(**{field.name: row[field.name] for field in fields(Figure)}) for row in rows]
+
+
+def renewed(old: Sequence[Figure], new: Sequence[Figure]) -> list[Figure]:
+    """Return old figures, those that were measured anew in their places, and the others after."""
+    found = {(f.benchmark, f.name): f for f in (*old, *new)}
+    return list(found.values())
+
+
+def in_own_process(name: str, *, quick: bool) -> list[Figure]:
+    """Run a benchmark in a process of its own and return its figures."""
+    script = Path(__file__).parents[1] / "benchmark.py"
+    with tempfile.TemporaryDirectory() as out:
+        command = [sys.executable, str(script), "--only", name, "--out", out]
+        subprocess.run(command + ["--quick"] * quick, check=True)
+        return saved(Path(out))
 
 
 def save(figures: Sequence[Figure], out: Path) -> None:

@@ -1,116 +1,108 @@
 """A video's worth of frames, tracked one after the other: a colon withdrawal and a stomach pan."""
 
-import resource
-import tempfile
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from mitsuba_endo.evaluate.distance import distance_to_mesh
-from mitsuba_endo.evaluate.metric_value import root_mean_square
-from mitsuba_endo.evaluate.trajectory_errors import (
-    absolute_trajectory_error,
-    relative_pose_error,
-    trajectory_alignment,
-)
-from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.records.correspondence import CorrespondenceMap
-from mitsuba_endo.records.solution import INTERVAL
+from mitsuba_endo.evaluate.sequence_errors import evaluate_sequence
+from mitsuba_endo.evaluate.sequence_metrics import SequenceMetrics
+from mitsuba_endo.evaluate.tracked_frames import TrackedFrames
 from mitsuba_endo.records.trajectory import FrameRow
-from mitsuba_endo.sequence.frames import Incoming, Unread
-from mitsuba_endo.sequence.outcome import SequenceResult, outcome_of
-from mitsuba_endo.sequence.run import run_sequence
-from mitsuba_endo.show.sequence_folder import write_sequence_folder
-from tests.lumen import FOCAL
+from mitsuba_endo.sequence.run import LONG_LOSS
 from tests.sequences import Recording, pan, withdrawal
 
-from .report import Figure
+from . import sequence_beside, sequence_photographs
+from .report import Figure, in_own_process
+from .sequence_run import SequenceRun, errors, run_frames, run_recording
 
 NAME = "sequence"
-Floats = NDArray[np.float64]
 
 WRONG = 2.0
 """mm: a placed frame farther from the truth than this, after the alignment, is silently wrong."""
-NEAR = 1.0
-"""mm within which the true surface counts as found."""
-SAMPLED = 10
-"""Every so many frames the points that were seen are compared with the surface."""
-POINTS = 400
-WINDOW = 100
-"""Frames over which the scale is compared with the truth."""
 DRAWS = 3
 """Short sequences of either kind, each with its own motion and noise: the first frame's errors are
 in all poses alike, so that intervals of one sequence say little."""
 NOTHING = range(25, 35)
 """Frames of which nothing is decoded, in the sequence with a gap."""
-
-
-@dataclass
-class Feed:
-    """Makes maps when they are asked for, and keeps the time that takes apart."""
-
-    recording: Recording
-    nothing: range = range(0)
-    seconds: float = 0.0
-    memory: list[float] = field(default_factory=list)
-    """Peak memory so far, MB, before each frame."""
-
-    def frames(self) -> Iterator[Incoming]:
-        for k in range(len(self.recording)):
-            began = perf_counter()
-            map_: Incoming = self._map(k)
-            self.memory.append(_peak())
-            self.seconds += perf_counter() - began
-            yield map_
-
-    def _map(self, k: int) -> Incoming:
-        if k in self.nothing:
-            return Unread(f"frame{k:04d}", "nothing is decoded")
-        map_ = self.recording.map(k)
-        return CorrespondenceMap(map_.q, map_.name)
-
-
-def run(quick: bool) -> list[Figure]:
-    """Track, write, and compare with the truth."""
-    width, height = (160, 120) if quick else (320, 240)
-    colon = withdrawal(40 if quick else 300, width=width, height=height)
-    stomach = pan(40 if quick else 200, width=width, height=height)
-    gap = withdrawal(60, seed=1)
-    figures = _figures("colon", *_tracked(colon), colon)
-    figures += _figures("stomach", *_tracked(stomach), stomach)
-    result, _, _ = _tracked(gap, NOTHING)
-    resumed = [row for row in result.rows if row.number not in NOTHING]
-    return [
-        *figures,
-        *_short(1 if quick else DRAWS),
-        _figure("gap of 10 frames: frames lost after it", _lost(resumed), "", "lower", 0),
-        _figure("gap of 10 frames: silently wrong", _wrong(result, gap), "", "lower", 0),
-    ]
-
+JUMP = 30
+"""Frames in either of the two places of the sequence that jumps."""
 
 _figure = partial(Figure, NAME)
 
 
-def _short(draws: int) -> list[Figure]:
-    """Return how often intervals hold the truth in short sequences."""
+def run(quick: bool) -> list[Figure]:
+    """Run all parts, each in a process of its own, whose memory nothing else has touched."""
+    return [figure for part in PARTS for figure in in_own_process(f"{NAME}/{part}", quick=quick)]
+
+
+def colon(quick: bool) -> list[Figure]:
+    """A withdrawal over 150 mm."""
+    return _whole("colon", _way(withdrawal, 300, quick=quick))
+
+
+def stomach(quick: bool) -> list[Figure]:
+    """A pan that ends where it began."""
+    return _whole("stomach", _way(pan, 200, quick=quick))
+
+
+def gap(_quick: bool) -> list[Figure]:
+    """Ten frames show nothing."""
+    truth = withdrawal(60, seed=1)
+    found = run_recording(truth, NOTHING)
+    after = [row for row in found.rows if row.number not in NOTHING]
+    return [
+        _figure("gap of 10 frames: frames lost after it", _lost(after), "", "lower", 0),
+        _figure("gap of 10 frames: largest error of a placed frame",
+                errors(found, truth).ate_aligned_max_mm, "mm", "lower", WRONG),
+    ]  # fmt: skip
+
+
+def jump(_quick: bool) -> list[Figure]:
+    """From one frame to the next the camera is in another colon."""
+    first, second = withdrawal(JUMP, seed=1), withdrawal(JUMP, seed=2)
+    maps = [*first.maps(), *(replace(m, name=f"other_{m.name}") for m in second.maps())]
+    found = run_frames(maps, first.rig())
+    parts = max(row.part for row in found.rows if not row.lost) + 1
+    said = any(f"falls into {parts} parts" in line for line in found.result.solution.verdict)
+    rows = [row for row in found.rows if row.number < JUMP]
+    before = TrackedFrames(found.result.solution, rows, None)
+    late = sum(bool(row.lost) for row in found.rows if row.number >= JUMP)
+    return [
+        _figure("jump to another place: two parts, told in the verdict", parts == 2 and said, "",
+                "higher", 1),
+        _figure("jump to another place: frames lost before the new part begins", late, "", "lower",
+                LONG_LOSS),
+        _figure("jump to another place: largest error of a frame before it",
+                evaluate_sequence(before, first.truth, None).ate_aligned_max_mm, "mm", "lower",
+                WRONG),
+    ]  # fmt: skip
+
+
+def long(quick: bool) -> list[Figure]:
+    """A thousand frames of 160 x 120 pixels: time and memory."""
+    truth = withdrawal(60 if quick else 1000)
+    found = run_recording(truth)
+    return [
+        _figure("long: frames", len(found.rows), "", ""),
+        *_tracking("long", errors(found, truth)),
+        *_costs("long", found),
+    ]
+
+
+def short(quick: bool) -> list[Figure]:
+    """Tell how often intervals hold the truth, over several short sequences."""
     held = []
-    for seed in range(draws):
+    for seed in range(1 if quick else DRAWS):
         for make in (withdrawal, pan):
             truth = make(60, seed=seed)
-            rows = outcome_of(run_sequence(truth.maps(), truth.rig())).rows
-            inside = [_within(row, truth) for row in rows if row.camera_std is not None]
-            held.append(np.mean(inside, axis=0).reshape(2, 6).mean(1))
-    shares = 100 * np.array(held).T
-    named = zip(("camera", "projector"), shares, strict=True)
+            found = errors(run_recording(truth), truth)
+            held.append((found.camera_intervals_percent, found.projector_intervals_percent))
+    shares = np.array(held, float).T
     return [
         figure
-        for what, share in named
+        for what, share in zip(("camera", "projector"), shares, strict=True)
         for figure in (
             _figure(f"short: 95 % intervals of {what} poses that hold the truth", share.mean(), "%",
                     "higher", 85),
@@ -119,153 +111,95 @@ def _short(draws: int) -> list[Figure]:
     ]  # fmt: skip
 
 
-def _tracked(recording: Recording, nothing: range = range(0)) -> tuple[SequenceResult, float, Feed]:
-    """Return what was found, the seconds it took, files included, and the frames' feed."""
-    feed, began = Feed(recording, nothing), perf_counter()
-    result = outcome_of(run_sequence(feed.frames(), recording.rig()))
-    with tempfile.TemporaryDirectory() as folder:
-        write_sequence_folder(Path(folder) / "out", result)
-    return result, perf_counter() - began - feed.seconds, feed
+def photographs(quick: bool) -> list[Figure]:
+    """Path-traced photographs, decoded and refined."""
+    found = sequence_photographs.tracked(6 if quick else 80)
+    return _figures("photographs", found, sequence_photographs.compared(found),
+                    sequence_photographs.TARGETS)  # fmt: skip
 
 
-def _figures(
-    what: str, result: SequenceResult, seconds: float, feed: Feed, truth: Recording
-) -> list[Figure]:
-    rows = [row for row in result.rows if not row.lost]
-    found, true = _poses(rows, truth)
-    rigid = trajectory_alignment(found, true, "rigid")
-    aligned, plain = (
-        root_mean_square(absolute_trajectory_error(found, true, by))
-        for by in (rigid, trajectory_alignment(found, true, "none"))
-    )
-    focal = result.solution.projector.focal
-    shift, turn = relative_pose_error(found, true, 10)
-    figure = partial(_named, what)
-    count = len(result.rows)
-    return [
-        figure("frames", count, "", ""),
-        figure("frames lost", 100 * _lost(result.rows) / count, "%", "lower", 2),
-        figure("silently wrong", _wrong(result, truth), "", "lower", 0),
-        figure("absolute trajectory error, aligned", aligned, "mm RMS", "lower", 0.3),
-        figure("absolute trajectory error, first cameras put together", plain, "mm RMS", "lower"),
-        figure("error of motions over 10 frames", root_mean_square(shift), "mm RMS", "lower"),
-        figure("error of turns over 10 frames", np.degrees(root_mean_square(turn)), "degrees RMS",
-               "lower"),
-        figure("scale of the way", _scale(found, true), "%", "lower", 0.3),
-        figure(f"scale, worst of {WINDOW} frames", _worst_scale(found, true), "%", "lower", 0.3),
-        figure("focal length", _focal_error(focal.value), "%", "lower", 0.1),
-        figure("loop: first against last frame", _loop(found, true), "mm", "lower", 0.3),
-        *_surface_figures(figure, result, truth, rigid),
-        *_intervals(figure, rows, truth),
-        figure("rate, files included", count / seconds, "frames/s", "higher", 3),
-        figure("peak memory", _peak() / 1000, "GB", "lower", 1.2),
-        figure("memory growth in the second half", _growth(feed.memory), "MB/frame", "lower", 1),
-    ]  # fmt: skip
+PARTS: dict[str, Callable[[bool], list[Figure]]] = {
+    "colon": colon,
+    "stomach": stomach,
+    "gap": gap,
+    "jump": jump,
+    "long": long,
+    "short": short,
+    "photographs": photographs,
+    "beside": sequence_beside.run,
+}
+
+TARGETS = {"lost": 2.0, "trajectory": 0.3, "surface": 0.25, "rate": 3.0}
+"""Of sequences of maps."""
 
 
-def _named(what: str, name: str, *rest: object) -> Figure:
-    return _figure(f"{what}: {name}", *rest)  # type: ignore[arg-type]
-
-
-def _surface_figures(
-    figure: "partial[Figure]", result: SequenceResult, truth: Recording, rigid: object
-) -> list[Figure]:
-    surface = result.surfaces[result.main]
-    assert surface is not None
-    rng = np.random.default_rng(0)
-    chosen = rng.choice(len(surface.vertices), min(20_000, len(surface.vertices)), replace=False)
-    moved = rigid.apply(surface.vertices)  # type: ignore[attr-defined]
-    mesh = truth.mesh
-    error, plain = (
-        distance_to_mesh(v[chosen], mesh.vertices, mesh.faces) for v in (moved, surface.vertices)
-    )
-    held = 100 * float((plain < INTERVAL * surface.std[chosen]).mean())
-    seen = _seen_points(truth, rng)
-    near = distance_to_mesh(seen, moved, surface.faces) <= NEAR
-    return [
-        figure("surface", root_mean_square(error), "mm RMS", "lower", 0.25),
-        figure("surface, first cameras put together", root_mean_square(plain), "mm RMS", "lower"),
-        figure(f"seen surface found within {NEAR:g} mm", 100 * float(near.mean()), "%", "higher",
-               90),
-        figure("95 % intervals of vertices that hold the truth", held, "%", "higher", 85),
-    ]  # fmt: skip
-
-
-def _seen_points(truth: Recording, rng: np.random.Generator) -> Floats:
-    """Return points (N, 3) of the true surface that some frame's camera saw lit, world."""
-    points = []
-    for k in range(0, len(truth), SAMPLED):
-        q, at = truth.exact(k)
-        lit = at[np.isfinite(q).all(-1)]
-        points.append(truth.world_from_camera[k].apply(lit[rng.integers(len(lit), size=POINTS)]))
-    return np.concatenate(points)
-
-
-def _intervals(figure: "partial[Figure]", rows: list[FrameRow], truth: Recording) -> list[Figure]:
-    held = np.array([_within(row, truth) for row in rows if row.camera_std is not None])
-    camera, projector = 100 * held[:, :6].mean(), 100 * held[:, 6:].mean()
-    return [
-        figure("95 % intervals of camera poses that hold the truth", camera, "%", "higher", 85),
-        figure("95 % intervals of projector poses that hold the truth", projector, "%", "higher",
-               85),
-    ]  # fmt: skip
-
-
-def _within(row: FrameRow, truth: Recording) -> NDArray[np.bool_]:
-    """Tell of camera (6) and projector (6) which intervals hold the truth."""
-    pairs = (
-        (row.world_from_camera, truth.world_from_camera[row.number], row.camera_std),
-        (row.projector_from_camera, truth.projector_from_camera[row.number], row.projector_std),
-    )
-    inside = []
-    for pose, true, std in pairs:
-        assert pose is not None
-        assert std is not None
-        turned = Rotation.from_matrix(pose.R @ true.R.T).as_rotvec()
-        inside.append(np.abs(np.concatenate([turned, pose.t - true.t])) < INTERVAL * std)
-    return np.concatenate(inside)
-
-
-def _poses(
-    rows: list[FrameRow], truth: Recording
-) -> tuple[list[RigidTransform], list[RigidTransform]]:
-    found = [row.world_from_camera for row in rows if row.world_from_camera is not None]
-    return found, [truth.world_from_camera[row.number] for row in rows]
+def _way(make: Callable[..., Recording], count: int, *, quick: bool) -> Recording:
+    return make(40, width=160, height=120) if quick else make(count, width=320, height=240)
 
 
 def _lost(rows: list[FrameRow]) -> int:
     return sum(bool(row.lost) for row in rows)
 
 
-def _wrong(result: SequenceResult, truth: Recording) -> int:
-    found, true = _poses([row for row in result.rows if not row.lost], truth)
-    aligned = trajectory_alignment(found, true, "rigid")
-    return int((absolute_trajectory_error(found, true, aligned) > WRONG).sum())
+def _whole(what: str, truth: Recording) -> list[Figure]:
+    found = run_recording(truth)
+    return _figures(what, found, errors(found, truth), TARGETS)
 
 
-def _scale(found: list[RigidTransform], true: list[RigidTransform]) -> float:
-    return 100 * abs(trajectory_alignment(found, true, "similarity").scale - 1)
+def _figures(
+    what: str, found: SequenceRun, m: SequenceMetrics, targets: dict[str, float]
+) -> list[Figure]:
+    named = partial(_named, what)
+    return [
+        named("frames", m.frames, "", ""),
+        *_tracking(what, m, targets),
+        named("trajectory, first cameras put together", m.ate_first_rms_mm, "mm RMS", "lower"),
+        named("motions over 10 frames", m.rpe_shift_rms_mm, "mm RMS", "lower"),
+        named("turns over 10 frames", m.rpe_turn_rms_deg, "degrees RMS", "lower"),
+        named("scale of the way", _size_of(m.scale_error_percent), "%", "lower", 0.3),
+        named("scale, worst of 100 frames", _size_of(m.scale_worst_percent), "%", "lower", 0.3),
+        named("stated deviation of the scale", found.scale_std, "%", ""),
+        named("focal length", _size_of(m.focal_error_percent), "%", "lower", 0.1),
+        named("first against last frame", m.last_to_first_mm, "mm", "lower",
+              0.3 if what == "stomach" else None),
+        named("surface", m.surface_rms_mm, "mm RMS", "lower", targets["surface"]),
+        named("surface, median", m.surface_median_mm, "mm", "lower"),
+        named("seen surface found within 1 mm", m.completeness_percent, "%", "higher", 90),
+        *(
+            named(f"95 % intervals of {of} that hold the truth", share, "%", "higher", 85)
+            for of, share in (
+                ("camera poses", m.camera_intervals_percent),
+                ("projector poses", m.projector_intervals_percent),
+                ("vertices", m.vertex_intervals_percent),
+            )
+        ),
+        *_costs(what, found, targets["rate"]),
+    ]  # fmt: skip
 
 
-def _worst_scale(found: list[RigidTransform], true: list[RigidTransform]) -> float:
-    starts = range(0, max(len(found) - WINDOW, 0) + 1, WINDOW // 2)
-    return max(_scale(found[k : k + WINDOW], true[k : k + WINDOW]) for k in starts)
+def _tracking(what: str, m: SequenceMetrics, targets: dict[str, float] = TARGETS) -> list[Figure]:
+    named = partial(_named, what)
+    return [
+        named("frames lost", 100 * m.lost / m.frames, "%", "lower", targets["lost"]),
+        named("largest error of a placed frame", m.ate_aligned_max_mm, "mm", "lower", WRONG),
+        named("trajectory, aligned", m.ate_aligned_rms_mm, "mm RMS", "lower",
+              targets["trajectory"]),
+    ]  # fmt: skip
 
 
-def _loop(found: list[RigidTransform], true: list[RigidTransform]) -> float:
-    shift, _ = relative_pose_error(found, true, len(found) - 1)
-    return float(shift[0])
+def _costs(what: str, found: SequenceRun, rate: float = TARGETS["rate"]) -> list[Figure]:
+    named, count = partial(_named, what), len(found.rows)
+    return [
+        named("rate, finish and files included", count / found.seconds, "frames/s", "higher", rate),
+        named("processor time a frame, the same", found.processor / count, "s", "lower"),
+        named("peak memory", found.peak / 1000, "GB", "lower", 1.2),
+        named("memory growth in the second half", found.growth, "MB/frame", "lower", 1),
+    ]  # fmt: skip
 
 
-def _focal_error(value: object) -> float:
-    return 100 * abs(value / FOCAL - 1) if isinstance(value, float) else float("inf")
+def _named(what: str, name: str, value: float | None, *rest: object) -> Figure:
+    return _figure(f"{what}: {name}", float("nan") if value is None else value, *rest)  # type: ignore[arg-type]
 
 
-def _peak() -> float:
-    """Return the peak memory of this process, MB (Linux counts in kB)."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def _growth(memory: list[float]) -> float:
-    half = len(memory) // 2
-    return (memory[-1] - memory[half]) / max(len(memory) - 1 - half, 1)
+def _size_of(value: float | None) -> float | None:
+    return None if value is None else abs(value)

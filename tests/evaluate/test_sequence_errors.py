@@ -8,13 +8,13 @@ import pytest
 from mitsuba_endo.errors import InputError
 from mitsuba_endo.evaluate.sequence_errors import evaluate_sequence
 from mitsuba_endo.evaluate.sequence_metrics import SequenceMetrics
-from mitsuba_endo.evaluate.tracked_frames import TrackedFrames
+from mitsuba_endo.evaluate.tracked_frames import PosePairs, TrackedFrames
+from mitsuba_endo.evaluate.trajectory_errors import trajectory_alignment
 from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.calibration import SurfaceEstimate
-from mitsuba_endo.records.rig import Camera
 from mitsuba_endo.records.solution import Solution
 from mitsuba_endo.records.trajectory import FrameRow
-from tests.sequences import SIZE, Recording, exact, withdrawal
+from tests.sequences import Recording, exact, withdrawal
 
 COUNT = 24
 STD = np.array([0.001, 0.001, 0.001, 0.1, 0.1, 0.1])
@@ -27,28 +27,7 @@ def clean() -> Recording:
 
 @pytest.fixture(scope="module")
 def truth(clean: Recording) -> Solution:
-    def fixed(value: object) -> dict[str, object]:
-        return {"value": value, "status": "fixed"}
-
-    def pose(at: RigidTransform) -> dict[str, object]:
-        return {"R": at.R.tolist(), "t": at.t.tolist(), "status": "fixed"}
-
-    projector = clean.projector
-    return Solution.model_validate({
-        "outcome": "truth", "units": "mm", "scale": "truth",
-        "camera": Camera.from_model(clean.camera),
-        "projector": {
-            "law": projector.law, "width": SIZE[0], "height": SIZE[1],
-            "focal": fixed(float(projector.focal)), "centre": fixed(list(projector.centre)),
-            "aspect": fixed(1.0), "distortion": fixed([0.0, 0.0]),
-        },
-        "frames": [
-            {"name": f"frame{k:04d}", "projector_from_camera": pose(own),
-             "world_from_camera": pose(at)}
-            for k, (own, at) in enumerate(
-                zip(clean.projector_from_camera, clean.world_from_camera, strict=True))
-        ],
-    })  # fmt: skip
+    return clean.truth
 
 
 def _rows(clean: Recording) -> list[FrameRow]:
@@ -61,7 +40,7 @@ def _rows(clean: Recording) -> list[FrameRow]:
 
 
 def _compare(clean: Recording, truth: Solution, rows: list[FrameRow], **of: object):
-    mesh = SurfaceEstimate(clean.mesh.vertices.astype(float), clean.mesh.faces)
+    mesh = clean.surface
     surface = of.pop("surface", mesh)
     solution = truth.model_copy(update=of)
     return evaluate_sequence(TrackedFrames(solution, rows, surface), truth, mesh)  # type: ignore[arg-type]
@@ -83,10 +62,10 @@ def test_the_truth_has_no_errors(clean: Recording, truth: Solution) -> None:
     assert (found.frames, found.lost, found.other_parts) == (COUNT, 2, 0)
     zero = [
         found.ate_aligned_rms_mm, found.ate_first_rms_mm, found.rpe_shift_rms_mm,
-        found.last_to_first_mm, found.scale_error_percent, found.focal_error_percent,
-        found.surface_rms_mm,
+        found.last_to_first_mm, found.scale_error_percent, found.scale_worst_percent,
+        found.focal_error_percent, found.surface_rms_mm,
     ]  # fmt: skip
-    assert zero == pytest.approx([0] * 7, abs=1e-6)
+    assert zero == pytest.approx([0] * 8, abs=1e-6)
     assert found.completeness_percent == 100
     assert found.camera_intervals_percent == found.projector_intervals_percent == 100
     assert len(found.depth) >= 10
@@ -142,6 +121,7 @@ def test_scale_is_taken_out_where_it_is_not_known(clean: Recording, truth: Solut
     assert found.last_to_first_mm == pytest.approx(0, abs=1e-6)
     assert found.ate_first_rms_mm is None
     assert found.scale_error_percent is None
+    assert found.scale_worst_percent is None
     assert found.camera_intervals_percent is None
 
 
@@ -181,3 +161,36 @@ def test_another_truth_is_refused(clean: Recording, truth: Solution) -> None:
         _compare(clean, truth, rows)
     with pytest.raises(InputError, match="2 frames with a pose"):
         _compare(clean, truth, _rows(clean)[:2])
+
+
+def test_the_worst_part_of_the_way_is_found(clean: Recording) -> None:
+    """Oracle: of 150 frames the last 30 are 2 % too far apart, so that the last of the windows is
+    worst, and worse than the whole way."""
+    count = 150
+    long = withdrawal(count, noise=exact)
+    true = [pose.t for pose in long.world_from_camera]
+    rows = []
+    for k in range(count):
+        beyond = max(k - 120, 0)
+        t = true[k] + 0.02 * (true[k] - true[k - beyond])
+        at = RigidTransform(long.world_from_camera[k].R, t)
+        rows.append(FrameRow(k, f"frame{k:04d}", world_from_camera=at,
+                             projector_from_camera=long.projector_from_camera[k]))  # fmt: skip
+    pairs = PosePairs(rows, list(zip(long.world_from_camera, long.projector_from_camera,
+                                     strict=True)))  # fmt: skip
+    by = trajectory_alignment(pairs.found[50:], pairs.true[50:], "similarity")
+    scales = pairs.scale_errors()
+    assert scales["scale_worst_percent"] == pytest.approx(100 / by.scale - 100)
+    assert scales["scale_worst_percent"] > 1.2 * scales["scale_error_percent"] > 0
+
+
+def test_intervals_of_vertices(clean: Recording, truth: Solution) -> None:
+    """Oracle: a surface 0.5 mm too far along z, for half of whose vertices twice that is stated."""
+    off = 0.5
+    shifted = clean.surface.vertices + np.array([0, 0, off])
+    std = np.where(np.arange(len(shifted)) % 2, 2 * off, 1e-6)
+    surface = SurfaceEstimate(shifted, clean.mesh.faces, std)
+    found = _compare(clean, truth, _rows(clean), surface=surface)
+    assert found.vertex_intervals_percent == pytest.approx(50, abs=2)
+    without = _compare(clean, truth, _rows(clean))
+    assert without.vertex_intervals_percent is None
