@@ -20,7 +20,7 @@ from mitsuba_endo.records.solution import INTERVAL, PoseEstimate, Solution
 from mitsuba_endo.solve.calibrate import calibrate
 from mitsuba_endo.solve.options import Options
 
-from .model_error_scenes import KINDS, draw, given, right_setting, rigs
+from .model_error_scenes import KINDS, Kind, draw, given, right_setting, rigs
 from .report import Figure
 
 NAME = "model_error"
@@ -94,7 +94,7 @@ def one(kind: str, seed: int) -> Drawn:
         kind, seed,
         warned_before=any(w.startswith("camera.K") for w in checked.warnings),
         suspected=checked.model["suspected"], unchecked=bool(checked.model["unchecked"]),
-        named=kind != RIGHT and _named(checked, KINDS[kind].names),
+        named=kind != RIGHT and _named(checked, KINDS[kind]),
         first=candidates[0]["key"] if candidates else "",
         group=len(candidates[0]["group"]) if candidates else 0,
         deviations=_deviations(checked, frames[0]),
@@ -150,14 +150,14 @@ def _of_pose(estimate: PoseEstimate, truth: rigs.Rig) -> list[float]:
     return [float(x) for x in np.abs(error[std > 0]) / std[std > 0]]
 
 
-def _named(solution: Solution, names: tuple[str, ...]) -> bool:
+def _named(solution: Solution, kind: Kind) -> bool:
     """Tell whether the right candidate, or one of whose group it is, is among the first two."""
     model = solution.model
     plan = [f"plan.{p['block']}" for p in model["plan"] if p["refuted"]]
     keys = plan + [c["key"] for c in model["candidates"][:_FIRST]]
     keys += [key for c in model["candidates"][:_FIRST] if len(c["group"]) <= _LARGE
              for key in c["group_keys"]]  # fmt: skip
-    return any(key.startswith(names) for key in keys)
+    return any(key.startswith(kind.names) or key == kind.whole for key in keys)
 
 
 def figures(drawn: Sequence[Drawn]) -> list[Figure]:

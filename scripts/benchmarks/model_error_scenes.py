@@ -48,6 +48,8 @@ class Kind:
     change: Callable[[Given], None]
     names: tuple[str, ...]
     """Beginnings of the keys of candidates that it is rightly called."""
+    whole: str = ""
+    """Key of the block of which several values are off, if so."""
     setting: Setting = field(default_factory=Setting)
 
 
@@ -157,7 +159,7 @@ KINDS: dict[str, Kind] = {
     "camera k2 + 0.05": Kind(_coefficient(1, 0.05), ("camera_distortion",)),
     "camera focal 3 %": Kind(_scaled(1.03, 1.03), ("camera_focal", "camera_matrix")),
     "camera focal 20 %": Kind(_scaled(1.2, 1.2), ("camera_focal", "camera_matrix")),
-    "camera aspect 2 %": Kind(_scaled(1, 1.02), ("camera_focal.aspect",)),
+    "camera aspect 2 %": Kind(_scaled(1, 1.02), ("camera_focal.aspect",), "camera_focal"),
     "camera cx + 4 px": Kind(_shifted(4, 0), ("camera_centre", "camera_matrix")),
     "camera cy + 4 px": Kind(_shifted(0, 4), ("camera_centre", "camera_matrix")),
     "double resolution": Kind(_resized(2), _K),
@@ -168,7 +170,7 @@ KINDS: dict[str, Kind] = {
     "projector k1": Kind(_projector(distortion=[0.03]), ("distortion",)),
     "projector aspect": Kind(_projector(aspect=1.02), ("aspect",)),
     "clamped, but moves": Kind(
-        lambda _: None, ("plan.projector_pose",), Setting(frames=4, moves=1)
+        lambda _: None, ("plan.projector_pose",), setting=Setting(frames=4, moves=1)
     ),
 }
 

@@ -12,11 +12,11 @@ from ...costs.term import ResidualTerm
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import Floats
 from ..sandwich_covariance import inverse_information
-from .candidates import ModelCandidate, Named, named
+from .candidates import GROSS, ModelCandidate, Named, named
 from .correction import Correction, correction
 from .extended import Extended, extend
 from .nuisance import Nuisance, doubtful, nuisance
-from .refits import Refit, refits, worth_trying
+from .refits import PIXELS, Refit, refits, worth_trying
 from .residual_images import Correlation
 from .score_tests import Tests, score_tests
 from .sharing_tests import PlanTest, plan_tests
@@ -40,6 +40,9 @@ _UNEXPLAINED = 0.25
 """Share of the residuals' energy that is structure from which on nothing counts as measured."""
 _FAR = 0.1
 """The same from which on refits begin far from the fit too: gross errors lead it astray."""
+_DECIDES, _MOST_PIXELS = 8 * GROSS, 7000
+"""Gain, noise variances, that a sample must promise for refits to name the cause, and pixels that
+it has at most. Chosen: a refit's gain is a robust cost's, and that of one candidate of all."""
 _EXPLAINED = 0.9
 """Share of the residuals' energy that a refit must take away to explain them."""
 _MOST = 0.5
@@ -214,7 +217,10 @@ def _refits(result: OptimisationResult, rig: Rig, tests: Tests) -> list[Refit]:
     order = [c.key for c in tests.candidates]
     tried = worth_trying(problem.layout, rig, problem.law, order)
     far = tests.before.structure.excess > _FAR
-    return refits(result, rig, tried, far=far)
+    # As many pixels as it takes for refits to decide, where the first order promises so much.
+    share = _DECIDES * result.noise.sigma**2 / max(tests.gain, 1e-300)
+    pixels = round(np.clip(share * problem.observations, PIXELS, _MOST_PIXELS))
+    return refits(result, rig, tried, far=far, pixels=pixels)
 
 
 def with_effect(result: OptimisationResult, formal: Floats, effect: float) -> Floats:

@@ -2,9 +2,9 @@
 
 To first order that is one step (:mod:`.nuisance`), but along the valleys in which poses, given
 values and surface make up for one another the cost rises long before that step ends. So of the step
-only the given values are taken, and unknowns and surfaces are solved for anew beside them. Where
-that does not lower the cost, and after gross errors, given values are free under their priors, from
-the best of shorter steps and of where refits ended. Where nothing lowers it, nothing moves.
+only the given values are taken, after gross errors of the refits, and unknowns and surfaces are
+solved for anew beside them. Where that does not lower the cost, given values are free under their
+priors, from the best of shorter steps. Where nothing lowers it, nothing moves.
 """
 
 from collections.abc import Mapping, Sequence
@@ -77,19 +77,19 @@ def correction(
         roots: square-root information of the given values, against data of which the information
             is divided by no design effect.
         step: (G,) of unknowns and given values to first order.
-        others: states of unknowns and given values that may be better beginnings.
+        others: states of unknowns and given values to which gross errors led, if they did.
     """
     result = extended.result
     problem, judge = _freed(extended, roots), replace(result.noise, last=True)
     minimiser = LevenbergMarquardt(_TOLERANCE, _ITERATIONS)
     base = evaluate(problem, extended.state)
-    best = _followed(problem, _stepped(extended, problem, step, 1.0))
-    if not others:
-        held = _held(extended, roots, best.state)
-        best = evaluate(problem, minimiser.run(held, best.state, judge).state)
-    if others or best.cost(judge) >= base.cost(judge):
+    starts = [_placed(extended, other) for other in others]
+    starts = starts or [_stepped(extended, problem, step, 1.0)]
+    best = min((_followed(problem, start) for start in starts), key=lambda at: at.cost(judge))
+    held = _held(extended, roots, best.state)
+    best = evaluate(problem, minimiser.run(held, best.state, judge).state)
+    if best.cost(judge) >= base.cost(judge):
         starts = [_stepped(extended, problem, step, share) for share in _SHARES]
-        starts += [_placed(extended, other) for other in others]
         tried = [base, best, *(_followed(problem, start) for start in starts)]
         best = min(tried, key=lambda at: at.cost(judge))
         best = minimiser.run(problem, best.state, judge).evaluation

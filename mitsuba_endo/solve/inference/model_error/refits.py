@@ -39,14 +39,17 @@ PLAN = "plan."
 MATRIX = "camera_matrix"
 """Key of focal length and centre of the camera together, as of another resolution or a crop."""
 LENS = "camera_distortion"
-WHOLE = (LENS, "centre")
+WHOLE = (LENS, "centre", "camera_focal")
 """Blocks whose parts are also freed together."""
 PIXELS = 700
 """In the sample of all frames together, about."""
 _LIKELY = 5
 """Ways that are tried because score tests put them first."""
 _FOCAL = "camera_focal.focal"
-_MISJUDGED = (_FOCAL, "camera_centre.x", "camera_centre.y", "centre.x", "centre.y", MATRIX, *WHOLE)
+_MISJUDGED = (
+    _FOCAL, "camera_focal.aspect", "camera_centre.x", "camera_centre.y", "centre.x", "centre.y",
+    MATRIX, *WHOLE,
+)  # fmt: skip
 AS_GOOD = 0.9
 """Share of the best refit's gain from which on another explains the residuals as well."""
 _HEAT, _FINALISTS, _FINAL = 4, 4, 16
@@ -116,7 +119,12 @@ def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> li
 
 
 def refits(
-    result: OptimisationResult, rig: Rig, tried: Sequence[Way], *, far: bool = False
+    result: OptimisationResult,
+    rig: Rig,
+    tried: Sequence[Way],
+    *,
+    far: bool = False,
+    pixels: int = PIXELS,
 ) -> list[Refit]:
     """Solve anew with each of the ways free.
 
@@ -124,6 +132,7 @@ def refits(
         result: the fit.
         rig: of it.
         tried: the ways.
+        pixels: in the sample of all frames together, about.
         far: whether gross errors may have led the fit far from where it should be.
 
     Returns:
@@ -132,7 +141,7 @@ def refits(
     problem, layout = result.problem, result.problem.layout
     if not possible(problem, result.state):
         return []
-    sample = sampled(result, rig, PIXELS)
+    sample = sampled(result, rig, pixels)
     none = Way("", problem.law)
     base = solved(sample, none, point_at(sample, none, result.state), _FINAL)
     ends = _race(sample, tried, base, far)

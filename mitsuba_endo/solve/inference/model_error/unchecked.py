@@ -28,14 +28,15 @@ from .score_tests import Testable, candidates
 
 Floats = NDArray[np.float64]
 
-_DOUBTED = 8.0
+_DOUBTED, _MOST = 8.0, 4
 """Deviations from noise alone, as the first order has them, of a gross error above which the maps
-check a value. Chosen: where the first order errs, it does so by a factor of two or three."""
+check a value, and how many values are tried at most, those that the maps see least first. Chosen:
+where the first order errs, it does so by a factor of two or three."""
 _TRACELESS = 10.0
 """Rise of the cost, noise variances, that no test notices: it is lost among some 16 candidates."""
 _MATTERS = 3.0
 """Standard deviations by which an unknown must move for a value to be told of."""
-_PIXELS = 7000
+_PIXELS = 2000
 """In the sample, about; what a rise in it means for all is in proportion."""
 _ITERATIONS = 20
 """Of the minimiser at most. Chosen: most end after five."""
@@ -48,7 +49,7 @@ class Unchecked:
     key: str
     words: str
     error: float
-    """That would leave no trace, in its unit."""
+    """That would leave no trace, in its unit: one that no careful calibration makes."""
     unit: str
     moved: float
     """Standard deviations, at most, by which it would move an unknown."""
@@ -83,25 +84,26 @@ def _doubted(extended: Extended, rig: Rig, variance: float) -> list[Testable]:
     _, information, _ = extended.directions(np.array([c.direction for c in given]).T)
     deviations = [c.limit * np.sqrt(max(i, 0.0) / variance)
                   for c, i in zip(given, np.diag(information), strict=True)]  # fmt: skip
-    return [c for c, d in zip(given, deviations, strict=True) if d < _DOUBTED]
+    order = sorted(zip(deviations, range(len(given)), strict=True))
+    return [given[i] for d, i in order[:_MOST] if d < _DOUBTED]
 
 
 def _tried(
     extended: Extended, sample: EpipolarSample, base: Point, candidate: Testable, variance: float
 ) -> Unchecked | None:
-    """Return a value if one of its two gross errors leaves no trace but moves an unknown."""
+    """Return a value of which a gross error leaves no trace but moves an unknown."""
     s = extended.solved
     std = np.sqrt(variance * np.diag(np.linalg.pinv(extended.S[np.ix_(s, s)], hermitian=True)))
-    out = None
-    for sign in (1.0, -1.0):
-        end = _displaced(sample, base, candidate, sign * candidate.limit)
-        noise = noise_of(base.r)
-        rise = robust_cost(end.r, noise) - robust_cost(base.r, noise)
-        rise *= extended.result.problem.observations / len(base.r)
-        moved = float(np.max(np.abs(sample.layout.difference(base.state, end.state)) / std))
-        if rise < _TRACELESS and moved > max(_MATTERS, 0.0 if out is None else out.moved):
-            out = Unchecked(candidate.key, candidate.words, candidate.limit, candidate.unit, moved)
-    return out
+    noise, all_ = noise_of(base.r), extended.result.problem.observations / len(base.r)
+    moved = 0.0
+    for error in (candidate.limit, -candidate.limit):
+        end = _displaced(sample, base, candidate, error)
+        rise = all_ * (robust_cost(end.r, noise) - robust_cost(base.r, noise))
+        by = np.abs(sample.layout.difference(base.state, end.state)) / std
+        moved = max(moved, float(by.max())) if rise < _TRACELESS else moved
+    if moved < _MATTERS:
+        return None
+    return Unchecked(candidate.key, candidate.words, candidate.limit, candidate.unit, moved)
 
 
 def _displaced(sample: EpipolarSample, base: Point, candidate: Testable, error: float) -> Point:
