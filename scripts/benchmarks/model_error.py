@@ -104,8 +104,14 @@ def one(kind: str, seed: int) -> Drawn:
 
 def solution_of(kind: str, seed: int) -> tuple[Solution, float]:
     """Return what a draw's calibration says, and the true focal length, pattern pixels."""
+    solution, truth = solution_and_truth(kind, seed)
+    return solution, float(truth.projector.focal)
+
+
+def solution_and_truth(kind: str, seed: int) -> tuple[Solution, rigs.Rig]:
+    """Return what a draw's calibration says, and its first frame as it was drawn."""
     frames, rig = _said(kind, seed)
-    return _calibrated(frames, rig, check=True)[0], float(frames[0].projector.focal)
+    return _calibrated(frames, rig, check=True)[0], frames[0]
 
 
 def _said(kind: str, seed: int) -> tuple[list[rigs.Rig], dict[str, object]]:

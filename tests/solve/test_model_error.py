@@ -190,15 +190,18 @@ def test_the_interval_holds_the_truth_though_the_model_is_wrong(error: dict[str,
     assert abs(trusting - FOCAL) > 4 * focal.std_formal
 
 
-def test_the_surface_allows_for_what_is_wrong_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Oracle: the sheet. Corrected for a wrong k1, its range is nearer than without."""
+@pytest.mark.parametrize("error", [{"k1": 0.01}, {"centre": 12.0}])
+def test_the_surface_allows_for_what_is_wrong_too(
+    error: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Oracle: the sheet. Corrected for what was given wrongly, its range is nearer than without."""
     taken: list[SurfaceEstimate] = []
     monkeypatch.setattr(
         assemble_module, "surface_estimate",
         lambda *of: taken.append(surface_estimate(*of)) or taken[-1],
     )  # fmt: skip
-    solved.__wrapped__(k1=0.01)
-    solved.__wrapped__(k1=0.01, check=False)
+    solved.__wrapped__(**error)
+    solved.__wrapped__(**error, check=False)
     truth = cast(
         lopsided_camera(128, 96), projector_model(LAW, FOCAL, (250.0, 205.0)), (512, 400), POSE,
         bumpy_sheet(70.0, (0.2, -0.1), 6.0, 4),
@@ -245,3 +248,35 @@ def test_a_clamped_projector_is_not_said_to_move() -> None:
     model = clamped(moves=0.0).model
     assert not model["suspected"]
     assert not any(p["refuted"] for p in model["plan"])
+
+
+def test_what_no_residual_can_check_is_said() -> None:
+    """Oracle: the same maps calibrated with a wrong aspect of the projector, which looks as right.
+
+    A pinhole projector before little relief: its pose makes up for its aspect.
+    """
+    told = little_relief(aspect=1.0)
+    found = {u["key"]: u for u in told.model["unchecked"]}
+    wrong = little_relief(aspect=1 + found["aspect"]["error"] / 100)
+    assert "the residuals look like noise; they would too if" in told.verdict[-1]
+    assert not told.model["suspected"]
+    assert not wrong.model["suspected"]
+    moved = np.subtract(*(s.frames[0].projector_from_camera.t for s in (told, wrong)))
+    assert np.abs(moved / told.frames[0].projector_from_camera.std[3:]).max() > 3
+    assert solved().model["unchecked"] == []
+
+
+def little_relief(aspect: float) -> Solution:
+    """Calibrate a pinhole projector's view of a sheet that is nearly plane."""
+    camera, size = lopsided_camera(128, 96), (512, 400)
+    projector = projector_model("pinhole", FOCAL, (250.0, 205.0))
+    rig = with_noise(
+        cast(camera, projector, size, POSE, bumpy_sheet(70.0, (0.2, -0.1), 3, 4)), 0.2, 1
+    )
+    given = Rig(
+        camera=Camera.from_model(camera),
+        projector=Projector(law="pinhole", width=512, height=400, centre=[250.0, 205.0],
+                            aspect=aspect, focal={"value": FOCAL}),
+        scale=Scale(baseline=rig.baseline),
+    )  # fmt: skip
+    return calibrate([CorrespondenceMap(q=rig.q.astype(np.float32), name="a")], given).solution

@@ -72,8 +72,9 @@ def conclusion(check: ModelCheck) -> str:
 def blind_spot(value: Unchecked) -> str:
     """Say what would leave no trace in the residuals, and what it would do."""
     unit = f" {value.unit}" if value.unit else ""
+    whose = "" if value.words.startswith(("camera", "projector")) else "projector's "
     return (
-        f"they would too if the {value.words} were {value.error:.2g}{unit} off, which moves focal "
+        f"they would too if the {whose}{value.words} were {value.error:.2g}{unit} off, which moves focal "
         f"length or pose by up to {value.moved:.0f} stated deviations: make sure of it, or add a "
         "frame that sees more relief"
     )
