@@ -16,6 +16,7 @@ from .depth import RayCaster
 from .distance import distance_to_mesh
 from .metric_value import root_mean_square
 from .sequence_metrics import FrameDepth
+from .shape import model_and_size
 from .tracked_frames import PosePairs, TrackedFrames
 from .trajectory_errors import trajectory_alignment
 
@@ -142,12 +143,9 @@ class TrackedViews:
 
     @cached_property
     def _light(self) -> tuple[ProjectorModel, tuple[int, int]]:
-        projector = self._truth.projector
-        model = projector.to_model()
-        assert model is not None
-        assert projector.width is not None
-        assert projector.height is not None
-        return model, (projector.width, projector.height)
+        known = model_and_size(self._truth.projector)
+        assert known is not None
+        return known
 
     @cached_property
     def _scene(self) -> "MeshScene":

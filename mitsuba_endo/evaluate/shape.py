@@ -10,6 +10,7 @@ from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..records.calibration import SurfaceEstimate
+from ..records.solution import ProjectorEstimate
 from .alignment import Similarity, align_robustly
 from .depth import Floats, RayCaster, range_image
 from .distance import distance_to_mesh
@@ -28,6 +29,12 @@ class Lighting:
     size: tuple[int, int]
     """Width and height of the pattern, pattern pixels."""
     projector_from_camera: RigidTransform
+
+
+def model_and_size(projector: ProjectorEstimate) -> tuple[ProjectorModel, tuple[int, int]] | None:
+    """Return a projector, and width and height of its pattern; None where one is not known."""
+    model, size = projector.to_model(), (projector.width, projector.height)
+    return None if model is None or not (size[0] and size[1]) else (model, (size[0], size[1]))
 
 
 @dataclass(frozen=True)

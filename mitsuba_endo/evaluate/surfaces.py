@@ -8,7 +8,7 @@ from ..reading.regular import is_file
 from ..records.calibration import SurfaceEstimate
 from ..records.solution import Frame, Solution
 from ..records.surface import load_surface, own_surface_name
-from .shape import Alignment, Lighting, ShapeErrors, compare_shape
+from .shape import Alignment, Lighting, ShapeErrors, compare_shape, model_and_size
 from .truths import Truths
 
 _SHARED = "the frame has no surface of its own"
@@ -96,7 +96,5 @@ def _lighting(truth: Solution, frame: Frame) -> Lighting | None:
     projector = truth.projector
     if frame.focal is not None:
         projector = projector.model_copy(update={"focal": frame.focal})
-    model, pose = projector.to_model(), frame.projector_from_camera.to_transform()
-    if model is None or pose is None or not (projector.width and projector.height):
-        return None
-    return Lighting(model, (projector.width, projector.height), pose)
+    known, pose = model_and_size(projector), frame.projector_from_camera.to_transform()
+    return None if known is None or pose is None else Lighting(*known, pose)
