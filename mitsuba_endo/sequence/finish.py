@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 from ..geometry.projection_models import ProjectorModel
 from ..records.rig import Rig
 from ..records.trajectory import FrameRow
-from .adjustment.priors import Plan
+from .adjustment.drift_and_gauge import Plan
 from .adjustment.refusion import FinishedPart, FinishedPose, finish_part
 from .bootstrap import Beginning
 from .joining import Joined, join

@@ -7,7 +7,7 @@ alone: its projector's error counts whole, and that of its camera is as large as
 
 A map that was made with a wrong pose of the projector is bent so that later frames find the same
 wrong pose. So the walk is one of both poses, and a wrong pose of the projector bends the way of the
-camera (:mod:`.bending`).
+camera (:mod:`.error_propagation`).
 """
 
 import numpy as np

@@ -11,8 +11,8 @@ from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
 from ..initialisation.range_image import RangeImage
-from .bending import bending
 from .epipolar_focal import pose_directions
+from .error_propagation import camera_by_projector
 from .gate import fault
 from .kept_views import KeptViews
 from .keyframes import Keyframes
@@ -197,7 +197,9 @@ class Part:
     def _bent(self, sample: PixelSample, found: Placement) -> Floats:
         """Return what a wrong pose of the projector has done since the last fused frame."""
         setup, poses = self.setup, found.poses
-        return bending(sample, found.found, poses, self._fused_pose, setup.projector, self.volume)
+        return camera_by_projector(
+            sample, found.found, poses, self._fused_pose, setup.projector, self.volume
+        )
 
     def _fuse(self, number: int, seen: Ranged) -> None:
         self.volume.integrate(seen.frame)

@@ -8,7 +8,7 @@ from .inference.fit import Fit
 from .inference.model_error.analysis import check_model
 from .job import Job, Optimised
 from .minimisers.minimise import Progress
-from .minimisers.smoothing import smooth_surfaces
+from .minimisers.surface_smoothing import smooth_surfaces
 
 
 def stopping(say: Progress) -> Progress:

@@ -13,6 +13,7 @@ from mitsuba_endo.geometry.transforms import RigidTransform
 from mitsuba_endo.records.correspondence import CorrespondenceMap
 from mitsuba_endo.sequence.adjustment.adjust import Adjusted, adjust
 from mitsuba_endo.sequence.adjustment.between import place_between
+from mitsuba_endo.sequence.adjustment.drift_and_gauge import Plan, drift_equations
 from mitsuba_endo.sequence.adjustment.equations import Weights, columns_of, equations
 from mitsuba_endo.sequence.adjustment.observations import (
     AdjustedFrame,
@@ -20,7 +21,6 @@ from mitsuba_endo.sequence.adjustment.observations import (
     Seen,
     observe,
 )
-from mitsuba_endo.sequence.adjustment.priors import Plan, drift_equations
 from mitsuba_endo.sequence.linearise import Poses
 from mitsuba_endo.sequence.projector_prior import ProjectorDrift
 from mitsuba_endo.sequence.view import view_of

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from mitsuba_endo.fusion import RangeFrame, Volume
 from mitsuba_endo.geometry.transforms import RigidTransform
-from mitsuba_endo.sequence.bending import bending
+from mitsuba_endo.sequence.error_propagation import camera_by_projector
 from mitsuba_endo.sequence.linearise import Poses, against_map, triangulate
 from mitsuba_endo.sequence.map_drift import MapDrift, in_world
 from mitsuba_endo.sequence.placement import Prior, place
@@ -79,7 +79,7 @@ def test_bending_is_what_a_wrong_projector_does() -> None:
     sample = last.sample(clean.projector)
     found = place(sample, true, clean.projector, volume, held, 0.1)
     moved = true.world_from_camera.inverse() @ found.poses.world_from_camera
-    bent = bending(
+    bent = camera_by_projector(
         sample, found.found, found.poses, clean.world_from_camera[0], clean.projector, volume
     )
     step = np.concatenate([Rotation.from_matrix(moved.R).as_rotvec(), moved.t])

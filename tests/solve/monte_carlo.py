@@ -9,7 +9,7 @@ from mitsuba_endo.solve.costs.objective import Problem, evaluate
 from mitsuba_endo.solve.elimination.normal_equations import NormalEquations
 from mitsuba_endo.solve.inference.covariance import uncertainty
 from mitsuba_endo.solve.minimisers.minimise import minimise
-from mitsuba_endo.solve.minimisers.smoothing import smooth_surfaces
+from mitsuba_endo.solve.minimisers.surface_smoothing import smooth_surfaces
 from mitsuba_endo.solve.options import Options
 from mitsuba_endo.solve.surfaces.inverse_range_lattice import Lattice
 from mitsuba_endo.solve.unknowns.state import State

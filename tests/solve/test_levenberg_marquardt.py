@@ -11,7 +11,7 @@ from mitsuba_endo.solve.inference.covariance import uncertainty
 from mitsuba_endo.solve.minimisers.levenberg_marquardt import LevenbergMarquardt
 from mitsuba_endo.solve.minimisers.minimise import minimise
 from mitsuba_endo.solve.minimisers.result import OptimisationResult
-from mitsuba_endo.solve.minimisers.smoothing import smooth_surfaces
+from mitsuba_endo.solve.minimisers.surface_smoothing import smooth_surfaces
 from mitsuba_endo.solve.options import Options
 from tests.rigs import Rig, with_noise, with_outliers
 from tests.solve.problems import (

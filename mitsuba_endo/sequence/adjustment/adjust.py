@@ -16,9 +16,9 @@ from ...geometry.projection_models import ProjectorModel
 from ...geometry.transforms import RigidTransform
 from ..linearise import Poses
 from .cluster_covariance import Covariance, covariance, curvature_weights, scatter
+from .drift_and_gauge import Plan, drift_equations, gauge
 from .equations import FRAME, Equations, Weights, equations
 from .observations import AdjustedFrame, Elements, Seen, observe
-from .priors import Plan, drift_equations, gauge
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from ..map_drift import in_world
 from ..range_images import ranged
 from .adjust import Adjusted, adjust
 from .between import place_between
+from .drift_and_gauge import Plan
 from .observations import AdjustedFrame, Elements
-from .priors import Plan
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from ..inference.fit import FrameSolution
 from ..minimisers.minimise import minimise
 from ..minimisers.render_result import render_frames
 from ..minimisers.result import USED_WEIGHT, OptimisationResult
-from ..minimisers.smoothing import smooth_surfaces
+from ..minimisers.surface_smoothing import smooth_surfaces
 from ..options import Options
 from ..surfaces.inverse_range_lattice import Lattice
 from ..unknowns.layout import Layout

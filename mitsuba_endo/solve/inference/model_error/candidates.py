@@ -49,14 +49,14 @@ def named(tests: Tests, found: Sequence[Refit], law: str) -> Named:
     if best < GROSS:
         return _by_scores(tests)
     known = {c.key: c for c in tests.candidates}
-    first = [_candidate(r, known.get(r.way.key)) for r in found if r.way.layout is None]
+    first = [_candidate(r, known.get(r.variant.key)) for r in found if r.variant.layout is None]
     keys = {c.key for c in first}
     rest = [replace(c, gain=0.0) for c in tests.candidates if c.key not in keys]
     as_good = [r for r in found if r.gain > _enough(best, ALIKE)]
-    plan = found[0].way.key.removeprefix(PLAN) if found[0].way.layout is not None else None
+    plan = found[0].variant.key.removeprefix(PLAN) if found[0].variant.layout is not None else None
     shifts = [r.shift for r in as_good if r.shift is not None]
     left = min(r.left for r in as_good)
-    ends = [r.end for r in as_good if r.way.layout is None and r.way.law == law]
+    ends = [r.end for r in as_good if r.variant.layout is None and r.variant.law == law]
     return Named([*_grouped(first, ALIKE), *rest], True, 1 - left, shifts, plan, ends)
 
 
@@ -78,9 +78,9 @@ def _enough(best: float, noise: float) -> float:
 
 def _candidate(refit: Refit, known: ModelCandidate | None) -> ModelCandidate:
     """Return a candidate with the value that a refit found."""
-    key = refit.way.key
+    key = refit.variant.key
     if known is None:
-        block = refit.way.steps[0][0] if refit.way.steps else None
+        block = refit.variant.steps[0][0] if refit.variant.steps else None
         words = BLOCKS[key].words if key in BLOCKS else _MATRIX_WORDS
         known = ModelCandidate(key, words, "", block, 0.0, np.inf, 0.0)
     value, share = refit.value, 1 - refit.left

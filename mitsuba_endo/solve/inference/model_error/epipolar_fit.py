@@ -32,7 +32,7 @@ _STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class EpipolarFrame:
     """One frame's sample at a state."""
 
     law: str
@@ -68,7 +68,9 @@ def thinned(observed: Observations, stride: int) -> Observations:
     )  # fmt: skip
 
 
-def look(observed: Observations, law: str, state: State, k: int, last: Look | None = None) -> Look:
+def epipolar_frame(
+    observed: Observations, law: str, state: State, k: int, last: EpipolarFrame | None = None
+) -> EpipolarFrame:
     """Return a frame's residuals; what has not changed since ``last`` is taken from there."""
     model = state.frame_model(k, observed.camera, law)
     assert isinstance(model.projector, ProjectorModel)  # see `possible`
@@ -85,11 +87,11 @@ def look(observed: Observations, law: str, state: State, k: int, last: Look | No
             seen = bearings(model.projector, observed.q, near)
         pose = state.at("projector_pose", k)
         at = residuals(pose, rays, seen)
-    return Look(law, camera, projector, pose, rays, seen, at, _root_weight(observed))
+    return EpipolarFrame(law, camera, projector, pose, rays, seen, at, _root_weight(observed))
 
 
 def derivatives(
-    observed: Observations, law: str, state: State, layout: Layout, k: int, now: Look
+    observed: Observations, law: str, state: State, layout: Layout, k: int, now: EpipolarFrame
 ) -> Floats:
     """Return the derivatives (G, n) of a frame's residuals with respect to a layout's unknowns.
 
@@ -108,12 +110,18 @@ def derivatives(
 
 
 def along(
-    observed: Observations, law: str, state: State, k: int, now: Look, name: str, step: Floats
+    observed: Observations,
+    law: str,
+    state: State,
+    k: int,
+    now: EpipolarFrame,
+    name: str,
+    step: Floats,
 ) -> Floats:
     """Return the derivative (n,) of a frame's residuals along a step of one block's value."""
     owner, size = state.owners[name][k], _STEP / float(np.linalg.norm(step))
     value = BLOCKS[name].retract(state.values[name][owner], size * step)
-    moved = look(observed, law, state.with_value(name, owner, value), k, now)
+    moved = epipolar_frame(observed, law, state.with_value(name, owner, value), k, now)
     return (moved.r - now.r) / size
 
 

@@ -16,7 +16,7 @@ from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout, make_layout
 from ...unknowns.state import State
-from .epipolar_fit import Look, along, derivatives, look, thinned
+from .epipolar_fit import EpipolarFrame, along, derivatives, epipolar_frame, thinned
 from .extended import freed, given_blocks
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ _FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class ModelVariant:
     """One thing to free: directions of given values, or another projection model."""
 
     key: str
@@ -63,12 +63,12 @@ class Point:
     state: State
     amounts: Floats
     """(K,) of the directions that are free."""
-    looks: list[Look]
+    frames: list[EpipolarFrame]
 
     @property
     def r(self) -> Floats:
         """(N,) residuals of all frames."""
-        return np.concatenate([at.r for at in self.looks])
+        return np.concatenate([at.r for at in self.frames])
 
 
 def sampled(result: OptimisationResult, rig: Rig, pixels: int) -> EpipolarSample:
@@ -80,16 +80,20 @@ def sampled(result: OptimisationResult, rig: Rig, pixels: int) -> EpipolarSample
     return EpipolarSample(layout, [thinned(o, stride) for o in problem.observed], given)
 
 
-def solved(sample: EpipolarSample, way: Way, now: Point, iterations: int) -> Point:
+def solved(sample: EpipolarSample, variant: ModelVariant, now: Point, iterations: int) -> Point:
     """Minimise by Levenberg-Marquardt on reweighted least squares, the scale falling along."""
     mu, up, down = _DAMPING
     sigma = noise_of(now.r)
     for _ in range(iterations):
-        J, r, cost = _jacobian(sample, way, now), np.nan_to_num(now.r), robust_cost(now.r, sigma)
+        J, r, cost = (
+            _jacobian(sample, variant, now),
+            np.nan_to_num(now.r),
+            robust_cost(now.r, sigma),
+        )
         w = np.where(np.isfinite(now.r), 1 / (1 + (r / (_CAUCHY * sigma)) ** 2), 0.0)
         H, g = (J * w) @ J.T, (J * w) @ r
         for _ in range(_TRIES):
-            trial = _moved(sample, way, now, _damped(H, g, mu))
+            trial = _moved(sample, variant, now, _damped(H, g, mu))
             gained = cost - robust_cost(trial.r, sigma)
             if gained >= 0:
                 break
@@ -111,34 +115,36 @@ def _damped(H: Floats, g: Floats, mu: float) -> Floats:
 
 
 def point_at(
-    sample: EpipolarSample, way: Way, state: State, amounts: Floats | None = None,
-    last: Sequence[Look | None] = (),
+    sample: EpipolarSample, variant: ModelVariant, state: State, amounts: Floats | None = None,
+    last: Sequence[EpipolarFrame | None] = (),
 ) -> Point:  # fmt: skip
-    """Return a point at a state with the way's values moved by ``amounts``."""
-    amounts = np.zeros(len(way.steps)) if amounts is None else amounts
-    given = {name: sample.given[name] for name, _ in way.steps}
-    for (name, step), amount in zip(way.steps, amounts, strict=True):
+    """Return a point at a state with the variant's values moved by ``amounts``."""
+    amounts = np.zeros(len(variant.steps)) if amounts is None else amounts
+    given = {name: sample.given[name] for name, _ in variant.steps}
+    for (name, step), amount in zip(variant.steps, amounts, strict=True):
         given[name] = BLOCKS[name].retract(given[name], amount * step)
     values = {name: (value,) * len(state.values[name]) for name, value in given.items()}
     state = replace(state, values={**state.values, **values})
     last = last or [None] * sample.layout.frames
-    looks = [look(o, way.law, state, k, last[k]) for k, o in enumerate(sample.observed)]
-    return Point(state, amounts, looks)
+    frames = [
+        epipolar_frame(o, variant.law, state, k, last[k]) for k, o in enumerate(sample.observed)
+    ]
+    return Point(state, amounts, frames)
 
 
-def _moved(sample: EpipolarSample, way: Way, now: Point, step: Floats) -> Point:
-    layout = way.layout or sample.layout
+def _moved(sample: EpipolarSample, variant: ModelVariant, now: Point, step: Floats) -> Point:
+    layout = variant.layout or sample.layout
     size = layout.columns
     state = layout.retract(now.state, step[:size])
-    return point_at(sample, way, state, now.amounts + step[size:], now.looks)
+    return point_at(sample, variant, state, now.amounts + step[size:], now.frames)
 
 
-def _jacobian(sample: EpipolarSample, way: Way, at: Point) -> Floats:
+def _jacobian(sample: EpipolarSample, variant: ModelVariant, at: Point) -> Floats:
     """Return the derivatives (G + K, N), zero where there is no residual."""
-    parts, layout = [], way.layout or sample.layout
-    for k, (observed, now) in enumerate(zip(sample.observed, at.looks, strict=True)):
-        own = derivatives(observed, way.law, at.state, layout, k, now)
-        further = [along(observed, way.law, at.state, k, now, *step) for step in way.steps]
+    parts, layout = [], variant.layout or sample.layout
+    for k, (observed, now) in enumerate(zip(sample.observed, at.frames, strict=True)):
+        own = derivatives(observed, variant.law, at.state, layout, k, now)
+        further = [along(observed, variant.law, at.state, k, now, *step) for step in variant.steps]
         parts.append(np.concatenate([own, np.reshape(further, (-1, len(now.r)))]))
     return np.nan_to_num(np.concatenate(parts, 1))
 

@@ -21,8 +21,8 @@ from ...unknowns.state import State
 from .epipolar_fit import possible
 from .epipolar_solve import (
     EpipolarSample,
+    ModelVariant,
     Point,
-    Way,
     noise_of,
     point_at,
     robust_cost,
@@ -53,20 +53,20 @@ _MISJUDGED = (
 AS_GOOD = 0.9
 """Share of the best refit's gain from which on another explains the residuals as well."""
 _HEAT, _FINALISTS, _FINAL = 4, 4, 16
-"""Iterations of every way, how many of the best go on, and for how many more."""
+"""Iterations of every variant, how many of the best go on, and for how many more."""
 _LOST = (_FOCAL, MATRIX, LENS, f"{LENS}.k1")
 """Ways that begin far from the fit too, after gross errors; another projection model does so."""
 _SIDES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, -1.0, 0.0))
 """Directions in which the projector may stand; opposite ones have the same residuals."""
 _FAR_HEAT = 8
-"""Iterations of ways that begin far from the fit, before they are compared. Chosen."""
+"""Iterations of variants that begin far from the fit, before they are compared. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
     """Where a candidate led."""
 
-    way: Way
+    variant: ModelVariant
     value: float
     """By how much the given value is off, in the candidate's unit; 1 for what has none."""
     gain: float
@@ -79,28 +79,32 @@ class Refit:
     """Of unknowns and given values, where it ended."""
 
 
-def ways(layout: Layout, rig: Rig, law: str) -> list[Way]:
+def variants(layout: Layout, rig: Rig, law: str) -> list[ModelVariant]:
     """Return everything that can be tried for a fit."""
     given = given_blocks(layout)
     wide = make_layout(freed(rig, given), layout.frames)
     out = [
-        Way(f"{name}.{s.part}" if s.part else name, law, [(name, s.step)])
+        ModelVariant(f"{name}.{s.part}" if s.part else name, law, [(name, s.step)])
         for name in given
         for s in BLOCKS[name].suspects(wide.names[name])
     ]
     if {"camera_focal", "camera_centre"} <= set(given):
         ends = [("camera_focal", np.full(2, 0.01))]
-        out.append(Way(MATRIX, law, [*ends, *(("camera_centre", axis) for axis in np.eye(2))]))
+        out.append(
+            ModelVariant(MATRIX, law, [*ends, *(("camera_centre", axis) for axis in np.eye(2))])
+        )
     out += [
-        Way(name, law, [(name, axis) for axis in np.eye(len(wide.names[name]))])
+        ModelVariant(name, law, [(name, axis) for axis in np.eye(len(wide.names[name]))])
         for name in WHOLE if name in given
     ]  # fmt: skip
-    out += [Way(f"law.{other}", other) for other in PROJECTION_MODELS if other != law]
-    return out + [Way(f"{PLAN}{name}", law, (), plan) for name, plan in alternatives(layout, rig)]
+    out += [ModelVariant(f"law.{other}", other) for other in PROJECTION_MODELS if other != law]
+    return out + [
+        ModelVariant(f"{PLAN}{name}", law, (), plan) for name, plan in alternatives(layout, rig)
+    ]
 
 
-def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> list[Way]:
-    """Return the ways that score tests put first, and those that they misjudge after gross errors.
+def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> list[ModelVariant]:
+    """Return the variants that score tests put first, and those misjudged after gross errors.
 
     Args:
         layout: of the fit.
@@ -108,12 +112,12 @@ def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> li
         law: of it.
         order: keys of the candidates, the most explaining first.
     """
-    found = {way.key: way for way in ways(layout, rig, law)}
+    found = {variant.key: variant for variant in variants(layout, rig, law)}
     first = [key for key in order if key in found][:_LIKELY]
     others = [
         key
-        for key, way in found.items()
-        if key in _MISJUDGED or way.law != law or way.layout is not None
+        for key, variant in found.items()
+        if key in _MISJUDGED or variant.law != law or variant.layout is not None
     ]
     return [found[key] for key in dict.fromkeys([*first, *others])]
 
@@ -121,17 +125,17 @@ def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> li
 def refits(
     result: OptimisationResult,
     rig: Rig,
-    tried: Sequence[Way],
+    tried: Sequence[ModelVariant],
     *,
     far: bool = False,
     pixels: int = PIXELS,
 ) -> list[Refit]:
-    """Solve anew with each of the ways free.
+    """Solve anew with each of the variants free.
 
     Args:
         result: the fit.
         rig: of it.
-        tried: the ways.
+        tried: the variants.
         pixels: in the sample of all frames together, about.
         far: whether gross errors may have led the fit far from where it should be.
 
@@ -142,51 +146,58 @@ def refits(
     if not possible(problem, result.state):
         return []
     sample = sampled(result, rig, pixels)
-    none = Way("", problem.law)
+    none = ModelVariant("", problem.law)
     base = solved(sample, none, point_at(sample, none, result.state), _FINAL)
     ends = _race(sample, tried, base, far)
     sigma = min([noise_of(base.r), *(noise_of(end.r) for _, end in ends)])
     before = noise_of(base.r)
     out = [
         Refit(
-            way, float(end.amounts[0]) if len(end.amounts) else 1.0,
+            variant, float(end.amounts[0]) if len(end.amounts) else 1.0,
             robust_cost(base.r, sigma) - robust_cost(end.r, sigma),
-            layout.difference(base.state, end.state) if way.layout is None else None,
+            layout.difference(base.state, end.state) if variant.layout is None else None,
             min((noise_of(end.r) / before) ** 2, 1.0), end.state,
         )
-        for way, end in ends
+        for variant, end in ends
     ]  # fmt: skip
     best = max((r.gain for r in out), default=0.0)
-    return sorted(out, key=lambda r: (len(r.way.steps), -r.gain) if r.gain >= AS_GOOD * best
+    return sorted(out, key=lambda r: (len(r.variant.steps), -r.gain) if r.gain >= AS_GOOD * best
                   else (np.inf, -r.gain))  # fmt: skip
 
 
 def _race(
-    sample: EpipolarSample, tried: Sequence[Way], base: Point, far: bool
-) -> list[tuple[Way, Point]]:
-    """Return where ways end, those that are behind after some iterations left out."""
-    heats: dict[str, tuple[Way, Point]] = {}
-    for way in tried:
-        starts = _starts(sample, way, base, far)
+    sample: EpipolarSample, tried: Sequence[ModelVariant], base: Point, far: bool
+) -> list[tuple[ModelVariant, Point]]:
+    """Return where variants end, those that are behind after some iterations left out."""
+    heats: dict[str, tuple[ModelVariant, Point]] = {}
+    for variant in tried:
+        starts = _starts(sample, variant, base, far)
         heat = _HEAT if len(starts) == 1 else _FAR_HEAT
-        ends = [solved(sample, way, start, heat) for start in starts]
-        heats[way.key] = way, min(ends, key=lambda end: robust_cost(end.r, noise_of(base.r)))
+        ends = [solved(sample, variant, start, heat) for start in starts]
+        heats[variant.key] = (
+            variant,
+            min(ends, key=lambda end: robust_cost(end.r, noise_of(base.r))),
+        )
     sigma = min([noise_of(base.r), *(noise_of(end.r) for _, end in heats.values())])
     order = sorted(heats.values(), key=lambda e: robust_cost(e[1].r, sigma))
     return [
-        (way, solved(sample, way, end, _FINAL))
-        for i, (way, end) in enumerate(order)
-        if i < _FINALISTS or way.key in (MATRIX, LENS, _FOCAL) or way.law != base.looks[0].law
+        (variant, solved(sample, variant, end, _FINAL))
+        for i, (variant, end) in enumerate(order)
+        if i < _FINALISTS
+        or variant.key in (MATRIX, LENS, _FOCAL)
+        or variant.law != base.frames[0].law
     ]
 
 
-def _starts(sample: EpipolarSample, way: Way, base: Point, far: bool) -> list[Point]:
-    """Return where a way begins: after gross errors also far from where the fit was led to."""
+def _starts(sample: EpipolarSample, variant: ModelVariant, base: Point, far: bool) -> list[Point]:
+    """Return where a variant begins: after gross errors also far from where the fit was led to."""
     state = base.state
-    if way.layout is not None:
-        state = widened(state, sample.layout, way.layout)
-    lost = far and (way.law != base.looks[0].law or way.key in _LOST)
-    return [point_at(sample, way, s) for s in (state, *(_sideways(sample, base) if lost else ()))]
+    if variant.layout is not None:
+        state = widened(state, sample.layout, variant.layout)
+    lost = far and (variant.law != base.frames[0].law or variant.key in _LOST)
+    return [
+        point_at(sample, variant, s) for s in (state, *(_sideways(sample, base) if lost else ()))
+    ]
 
 
 def _sideways(sample: EpipolarSample, base: Point) -> Iterator[State]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ....model_error.design_effect import DesignEffect, design_effect
-from ....model_error.structure import SMOOTHING_PX, Structure, structure
+from ....residual_statistics.design_effect import DesignEffect, design_effect
+from ....residual_statistics.structure import SMOOTHING_PX, Structure, structure
 from ...costs.coordinate_residual import Observations
 from ...minimisers.result import OptimisationResult
 

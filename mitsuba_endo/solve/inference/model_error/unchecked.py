@@ -15,8 +15,8 @@ from ...unknowns.block import BLOCKS
 from .epipolar_fit import possible
 from .epipolar_solve import (
     EpipolarSample,
+    ModelVariant,
     Point,
-    Way,
     noise_of,
     point_at,
     robust_cost,
@@ -70,7 +70,7 @@ def unchecked(extended: Extended, rig: Rig, variance: float) -> list[Unchecked]:
     doubted = _doubted(extended, rig, variance) if own else []
     if not doubted or not possible(problem, extended.result.state):
         return []
-    sample, none = sampled(extended.result, rig, _PIXELS), Way("", problem.law)
+    sample, none = sampled(extended.result, rig, _PIXELS), ModelVariant("", problem.law)
     base = solved(sample, none, point_at(sample, none, extended.result.state), _ITERATIONS)
     found = [_tried(extended, sample, base, c, variance) for c in doubted]
     return sorted((f for f in found if f is not None), key=lambda f: -f.moved)
@@ -108,7 +108,7 @@ def _tried(
 
 def _displaced(sample: EpipolarSample, base: Point, candidate: Testable, error: float) -> Point:
     """Solve with a given value displaced by so many of its units."""
-    name, none = candidate.block or "", Way("", base.looks[0].law)
+    name, none = candidate.block or "", ModelVariant("", base.frames[0].law)
     assert candidate.step is not None  # only blocks are asked
     value = BLOCKS[name].retract(sample.given[name], error * candidate.step)
     held = replace(sample, given={**sample.given, name: value})

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.model_error.structure import SMOOTHING_PX, structure
-from tests.model_error.noise import SHAPE, holes, white
+from mitsuba_endo.residual_statistics.structure import SMOOTHING_PX, structure
+from tests.residual_statistics.noise import SHAPE, holes, white
 
 DRAWS = 60
 

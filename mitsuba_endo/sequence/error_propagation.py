@@ -19,7 +19,7 @@ from .view import PixelSample
 Floats = NDArray[np.float64]
 
 
-def bending(
+def camera_by_projector(
     sample: PixelSample,
     found: Triangulated,
     poses: Poses,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mitsuba_endo.model_error.design_effect import design_effect
-from tests.model_error.noise import SHAPE, ar_design_effect, autoregressive, holes, white
+from mitsuba_endo.residual_statistics.design_effect import design_effect
+from tests.residual_statistics.noise import SHAPE, ar_design_effect, autoregressive, holes, white
 
 DRAWS = 60
 
