@@ -74,9 +74,9 @@ def blind_spot(value: Unchecked) -> str:
     unit = f" {value.unit}" if value.unit else ""
     whose = "" if value.words.startswith(("camera", "projector")) else "projector's "
     return (
-        f"they would too if the {whose}{value.words} were {value.error:.2g}{unit} off, which moves focal "
-        f"length or pose by up to {value.moved:.0f} stated deviations: make sure of it, or add a "
-        "frame that sees more relief"
+        f"they would too if the {whose}{value.words} were {value.error:.2g}{unit} off, which moves "
+        f"focal length or pose by up to {value.moved:.0f} stated deviations: make sure of it, or "
+        "add a frame that sees more relief"
     )
 
 
