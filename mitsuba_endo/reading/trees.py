@@ -21,15 +21,46 @@ _BROKEN = (
 """What PyYAML raises for dates, tags and numbers that are none, besides its own errors."""
 
 
+class _RepeatedKey(yaml.YAMLError):
+    """A mapping has a key twice: PyYAML would take the last one without a word."""
+
+    def __init__(self, key: str, line: int) -> None:
+        self.key, self.line = key, line
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader, which takes no key twice."""
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._merged = set[int]()
+        """Mappings that hold those of others already, which their own ones override."""
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Look at a mapping's own keys before those of other mappings are merged into it."""
+        own = set[tuple[str, str]]()
+        for key, _ in [] if id(node) in self._merged else node.value:
+            if isinstance(key, yaml.ScalarNode):
+                name = key.tag, key.value
+                if name in own:
+                    raise _RepeatedKey(key.value, key.start_mark.line + 1)
+                own.add(name)
+        self._merged.add(id(node))
+        super().flatten_mapping(node)
+
+
 def read_yaml(path: str | Path) -> dict[str, Any]:
     """Read a YAML mapping.
 
     Raises:
-        InputError: missing, too large or too deep, no YAML, or no mapping.
+        InputError: missing, too large or too deep, no YAML, a key that stands twice, or no mapping.
     """
     text = read_text(path, YAML)
     try:
-        data = yaml.safe_load(text)
+        data = yaml.load(text, _Loader)  # a SafeLoader
+    except _RepeatedKey as error:
+        where = f"{path}: {error.key}"
+        raise InputError(f"stands twice, again in line {error.line}", where, "keep one") from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f" in line {mark.line + 1}" if mark else ""

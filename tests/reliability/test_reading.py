@@ -16,6 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import yaml
 
 from mitsuba_endo.decoding.image_files import read_image
 from mitsuba_endo.errors import InputError, shown
@@ -127,6 +128,17 @@ YAML = {
     "code": "a: !!python/object/apply:os.system ['false']\n",
     "no boolean": "a: !!bool x\n",
 }  # fmt: skip
+
+
+def test_a_key_that_stands_twice_is_refused_and_a_merged_one_is_not(tmp_path: Path):
+    """YAML wants keys once; PyYAML takes the last. Oracle: the sentence, and PyYAML on merges."""
+    path = tmp_path / "a.yaml"
+    path.write_text("units: mm\nprojector:\n  width: 3\n  width: 4\n")
+    with pytest.raises(InputError, match=r"a\.yaml: width: stands twice, again in line 4"):
+        read_yaml(path)
+    merged = "a: &a {x: 1, y: 2}\nb:\n  <<: *a\n  x: 3\nd: &d {<<: *a, x: 4}\ne: {<<: *d}\n"
+    path.write_text(merged)
+    assert read_yaml(path) == yaml.safe_load(merged)
 
 
 @pytest.mark.parametrize("case", YAML)
