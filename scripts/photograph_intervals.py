@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from mitsuba_endo import backend
 from mitsuba_endo.decoding.network import load_network
+from mitsuba_endo.errors import InputError
 from mitsuba_endo.records.rig import Camera, Projector, Rig, Scale
 from mitsuba_endo.records.solution import INTERVAL, Solution
 from mitsuba_endo.solve.calibrate import calibrate
@@ -54,7 +55,11 @@ def main() -> None:
         for kind in KINDS:
             shot = cached_shot(kind, seed, spp=16, size=SIZE)
             for condition in CONDITIONS:
-                map_ = judge(network, kind, seed, condition, shot).refined.map
+                try:
+                    map_ = judge(network, kind, seed, condition, shot).refined.map
+                except InputError:
+                    print(f"{kind} {seed} {condition}: not decoded", flush=True)
+                    continue
                 off = _deviations(calibrate([map_], _rig(shot)).solution, shot)
                 if off is None:
                     print(f"{kind} {seed} {condition}: not determined", flush=True)
