@@ -54,6 +54,7 @@ def _see_to_interrupts() -> None:
     for number in _SIGNALS:
         if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):
             signal.signal(number, interrupt_after_loading)
+    sys.unraisablehook = _again_if_lost
 
 
 def _let_end() -> None:
@@ -61,6 +62,17 @@ def _let_end() -> None:
     for number in _SIGNALS:
         if signal.getsignal(number) is interrupt_after_loading:
             signal.signal(number, signal.SIG_IGN)
+
+
+def _again_if_lost(lost: "sys.UnraisableHookArgs") -> None:
+    """Try an interrupt again that came where Python has nobody to raise it to.
+
+    Callbacks of weak references, of C code and of the garbage collector are such places.
+    """
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, RETRY)
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def interrupt_after_loading(number: int, frame: FrameType | None) -> None:

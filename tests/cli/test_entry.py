@@ -53,3 +53,32 @@ def test_the_hook_interrupts():
     hook = HOOK.format(module="networkx", number="SIGINT", arguments=[])
     run = "try:\n    import networkx\nexcept KeyboardInterrupt:\n    sys.exit(7)"
     assert subprocess.run([sys.executable, "-c", hook + run], timeout=60).returncode == 7
+
+
+LOST = """
+import os, signal, sys, weakref
+from mitsuba_endo.cli import entry
+
+class Thing:
+    pass
+
+def gone(_reference):
+    os.kill(os.getpid(), signal.SIGTERM)
+    sum(range(100))  # Python calls the signal's handler between two instructions
+
+entry._see_to_interrupts()
+thing = Thing()
+reference = weakref.ref(thing, gone)
+try:
+    del thing
+    import time
+    time.sleep(20)
+except KeyboardInterrupt:
+    print("felt")
+"""
+
+
+def test_an_interrupt_in_a_callback_of_python_is_not_lost():
+    """Oracle: Python prints and drops what a weak reference's callback raises."""
+    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("felt\n", "")
