@@ -107,11 +107,11 @@ def find_convention(
         for pair in _references(samples, plan, reference)
         for order in orders(plan, stated)
     ]
-    found: list[Hypothesis] = []
+    readings: list[Hypothesis] = []
     for k, (plan, pair, order) in enumerate(tried):
-        found += _readings(samples, plan, pair, order, stated)
+        readings += _readings(samples, plan, pair, order, stated)
         advance((k + 1) / len(tried))
-    return _best(found, len(tried), possible.one_direction)
+    return _best(readings, len(tried), possible.one_direction)
 
 
 def _references(
@@ -156,43 +156,43 @@ def _readings(
 ) -> Iterator[Hypothesis]:
     """Yield the readings of one order that make some sense."""
     free = [k for k in range(len(samples.images)) if k not in (reference or ())]
-    place = dict(zip(order.labels(plan), free, strict=True))
+    image_index = dict(zip(order.labels(plan), free, strict=True))
     if reference is not None:
-        place["white"], place["black"] = reference
-    if not samples.balanced(plan, place):
+        image_index["white"], image_index["black"] = reference
+    if not samples.balanced(plan, image_index):
         return
-    if plan.stripe and not samples.fine_bits_vary(plan, place):
+    if plan.stripe and not samples.fine_bits_vary(plan, image_index):
         return
-    positions = tuple(place[label] for label in plan.labels())
+    positions = tuple(image_index[label] for label in plan.labels())
     codes: tuple[Code, ...] = ("gray", "binary") if plan.stripe else ("gray",)
     for code in codes:
         if not stated.allows("code", code):
             continue
         coded = replace(plan, code=code)
-        for phase, map_ in _maps(samples, coded, place, stated):
+        for phase, map_ in _maps(samples, coded, image_index, stated):
             convention = StackConvention(order, code, phase.sign, phase.offset)
             yield Hypothesis(replace(coded, phase=phase), convention, positions, map_)
 
 
 def _maps(
-    samples: StackSamples, plan: StackPlan, place: dict[str, int], stated: Stated
+    samples: StackSamples, plan: StackPlan, image_index: dict[str, int], stated: Stated
 ) -> Iterator[tuple[PhaseConvention, SampleMap]]:
     """Yield the maps under each convention of the phases that fits at all."""
     coarse: list[AxisMap] = []
     for axis in AXES if plan.stripe else ():
-        coarse.append(_stripes(samples, plan, axis, place))
+        coarse.append(_stripes(samples, plan, axis, image_index))
         if coarse[-1].share < LEAST_SHARE:
             return
     if plan.kind == "gray":
         yield plan.phase, joined(coarse, samples.lit)
         return
-    known = [np.where(np.isfinite(axis.q), axis.q, np.float32(np.nan)) for axis in coarse]
+    coordinates = [np.where(np.isfinite(axis.q), axis.q, np.float32(np.nan)) for axis in coarse]
     if coarse and joined(coarse, samples.lit).share < LEAST_SHARE:
         return
-    for phase in phase_conventions(samples, plan, place, known, stated):
+    for phase in phase_conventions(samples, plan, image_index, coordinates, stated):
         axes: list[AxisMap] = []
-        for axis, coarse_q in zip(AXES, known or (None, None), strict=True):
-            axes.append(_fringes(samples, replace(plan, phase=phase), axis, place, coarse_q))
+        for axis, coarse_q in zip(AXES, coordinates or (None, None), strict=True):
+            axes.append(_fringes(samples, replace(plan, phase=phase), axis, image_index, coarse_q))
             if axes[-1].share < LEAST_SHARE:
                 break
         else:
@@ -203,10 +203,10 @@ def _fringes(
     samples: StackSamples,
     plan: StackPlan,
     axis: Axis,
-    place: dict[str, int],
+    image_index: dict[str, int],
     coarse: NDArray[np.float32] | None,
 ) -> AxisMap:
-    images = samples.axis(plan, axis, place)
+    images = samples.axis(plan, axis, image_index)
     if not periods_agree(images, plan, axis, coarse, samples.lit):
         return AxisMap.of(np.full(samples.lit.shape, np.float32(np.nan)), images.white, samples.lit)
     none = [np.zeros(samples.lit.shape, bool) for _ in plan.periods]
@@ -215,13 +215,15 @@ def _fringes(
     return AxisMap.of(within(q, plan.size[axis], beyond=np.inf), width, samples.lit)
 
 
-def _stripes(samples: StackSamples, plan: StackPlan, axis: Axis, place: dict[str, int]) -> AxisMap:
+def _stripes(
+    samples: StackSamples, plan: StackPlan, axis: Axis, image_index: dict[str, int]
+) -> AxisMap:
     """Return the middles of an axis's stripes."""
     labels = labels_needed(plan, axis)
     key = (axis, plan.kind, plan.stripe, plan.inverse, plan.steps, plan.code,
-           *(place[label] for label in labels))  # fmt: skip
+           *(image_index[label] for label in labels))  # fmt: skip
     if key not in samples.cache:
-        images = samples.axis(plan, axis, place)
+        images = samples.axis(plan, axis, image_index)
         q, width = _middles(images, plan, axis, samples.noise)
         samples.cache[key] = AxisMap.of(q, width, samples.lit)
     return samples.cache[key]
@@ -242,18 +244,18 @@ def _middles(
         left &= ~certain
         inside = certain & (index < stripe_count(plan.size[axis], stripe))
         # Those beyond the pattern stay, to be counted.
-        place = 0.5
+        position = 0.5
         if plan.fringe_is_stripe:
             noises = np.broadcast_to(spread, signal.shape)[:, certain]
-            ways = edge_distances(index[certain], signal[:, certain], noises, plan.code)
-            place = thirds(ways.way)
-        q[certain], width[certain] = (index[certain] + place) * stripe - 0.5, stripe
+            distances = edge_distances(index[certain], signal[:, certain], noises, plan.code)
+            position = thirds(distances.ratio)
+        q[certain], width[certain] = (index[certain] + position) * stripe - 0.5, stripe
         q[certain & ~inside] = np.inf
     return q, width
 
 
-def _best(found: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypothesis:
-    ranked = sorted(found, key=lambda one: -one.map.share)
+def _best(readings: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypothesis:
+    ranked = sorted(readings, key=lambda one: -one.map.share)
     if not ranked or ranked[0].map.share < LEAST_SHARE:
         raise _nothing_fits(ranked, tried, one_direction)
     best = ranked[0]
@@ -264,7 +266,7 @@ def _best(found: Sequence[Hypothesis], tried: int, one_direction: bool) -> Hypot
                 "stack", "state the right one",
             )  # fmt: skip
     # Of those that are the same, the commonest.
-    return next(one for one in found if one.map.share >= SAME * best.map.share)
+    return next(one for one in readings if one.map.share >= SAME * best.map.share)
 
 
 def _nothing_fits(ranked: Sequence[Hypothesis], tried: int, one_direction: bool) -> InputError:
@@ -284,6 +286,6 @@ def _nothing_fits(ranked: Sequence[Hypothesis], tried: int, one_direction: bool)
 
 def _same_map(one: Hypothesis, other: Hypothesis) -> bool:
     apart = np.abs(np.where(np.isfinite(one.map.q), one.map.q, np.nan) - other.map.q).max(-1)
-    known = np.isfinite(apart)
+    finite = np.isfinite(apart)
     width = np.minimum(one.map.width, other.map.width)
-    return bool(known.any()) and float(np.median((apart / width)[known])) < OTHER_MAP
+    return bool(finite.any()) and float(np.median((apart / width)[finite])) < OTHER_MAP

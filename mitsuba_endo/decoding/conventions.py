@@ -191,11 +191,11 @@ def orders(plan: StackPlan, stated: Stated) -> Iterator[StackOrder]:
         "phase_first": both if mixed else (False,),
     }
     assert list(choices) == [field.name for field in fields(StackOrder)]
-    seen = set()
+    yielded = set()
     for values in product(*choices.values()):
         if all(stated.allows(*pair) for pair in zip(choices, values, strict=True)):
             order = StackOrder(*values)
             labels = tuple(order.labels(plan))
-            if labels not in seen:
-                seen.add(labels)
+            if labels not in yielded:
+                yielded.add(labels)
                 yield order

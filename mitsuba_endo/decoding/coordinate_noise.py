@@ -38,9 +38,9 @@ def with_measured_noise(
         left_out: (H, W) fine bits that were left out.
     """
     result = spread.copy()
-    known = np.isfinite(q)
-    for level in np.unique(left_out[known]).tolist():
-        chosen = known & (left_out == level)
+    finite = np.isfinite(q)
+    for level in np.unique(left_out[finite]).tolist():
+        chosen = finite & (left_out == level)
         stripe = width * 2**level
         measured = _scatter(np.where(chosen, q, np.nan), MOVED * stripe)
         if measured is None:
@@ -60,9 +60,9 @@ def _scatter(q: NDArray[np.float32], least: float) -> float | None:
         for values in (q, q.T):
             ahead, here, behind = values[:, 2 * lag :], values[:, lag:-lag], values[:, : -2 * lag]
             second = ahead - 2 * here + behind
-            known = np.isfinite(second)
-            across = known & (np.abs(ahead - behind) >= 2 * least)
-            if np.count_nonzero(across) >= max(FEW, 0.5 * np.count_nonzero(known)):
+            finite = np.isfinite(second)
+            across = finite & (np.abs(ahead - behind) >= 2 * least)
+            if np.count_nonzero(across) >= max(FEW, 0.5 * np.count_nonzero(finite)):
                 second = second[across]
                 return float(np.percentile(np.abs(second), SHARE)) / (LARGER * 6**0.5)
     return None

@@ -37,13 +37,13 @@ def gap_code(rows: int, columns: int, seed: int = 0) -> NDArray[np.int8]:
     marked: list[tuple[int, ...]] = []
     taken: set[int] = set()
     for _ in range(MAX_STEPS * rows * columns):
-        place = len(marked)
-        if place == rows * columns:
+        index = len(marked)
+        if index == rows * columns:
             code.flags.writeable = False
             return code
-        if len(choices) == place:
+        if len(choices) == index:
             choices.append([int(c) for c in rng.permutation([-1, 0, 1])])
-        added = _place_one(code, divmod(place, columns), choices[-1], taken)
+        added = _place_one(code, divmod(index, columns), choices[-1], taken)
         if added is not None:
             marked.append(added)
             continue
@@ -66,10 +66,10 @@ def _place_one(
         if row < WINDOW - 1 or column < WINDOW - 1:
             return ()
         window = code[row - WINDOW + 1 : row + 1, column - WINDOW + 1 : column + 1]
-        seen = _views(tuple(window.ravel().tolist()))
-        if seen and not taken.intersection(seen):
-            taken.update(seen)
-            return seen
+        neighbourhoods = _views(tuple(window.ravel().tolist()))
+        if neighbourhoods and not taken.intersection(neighbourhoods):
+            taken.update(neighbourhoods)
+            return neighbourhoods
     return None
 
 

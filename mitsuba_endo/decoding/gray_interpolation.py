@@ -33,7 +33,7 @@ NEAR = 0.02
 class EdgeDistances:
     """How near pixels (...) lie to the two edges of their stripe, by signals alone."""
 
-    way: NDArray[np.float32]
+    ratio: NDArray[np.float32]
     """0 at the lower edge to 1 at the upper; in between, it only grows with the place."""
     noise: NDArray[np.floating]
     """Its standard deviation."""
@@ -105,23 +105,25 @@ def place_within(
     distances: EdgeDistances,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the place (N,) of pixels within their stripes, 0 to 1, and its standard deviation."""
-    place = np.full(distances.way.shape, np.float32(0.5))
-    spread = np.full_like(place, ANYWHERE)
+    position = np.full(distances.ratio.shape, np.float32(0.5))
+    spread = np.full_like(position, ANYWHERE)
     for kind in np.unique(distances.kind):
         chosen = np.flatnonzero(distances.kind == kind)
         if len(chosen) < FEW:
             continue
-        way, inside = distances.way[chosen], distances.inside[chosen]
-        ranked = np.sort(way)
+        ratio, inside = distances.ratio[chosen], distances.inside[chosen]
+        ranked = np.sort(ratio)
         for part in np.array_split(np.arange(len(chosen)), -(-len(chosen) // TOGETHER)):
-            density = (_rank(ranked, way[part] + NEAR) - _rank(ranked, way[part] - NEAR)) / 2 / NEAR
-            place[chosen[part]] = _rank(ranked, way[part])
+            density = (
+                (_rank(ranked, ratio[part] + NEAR) - _rank(ranked, ratio[part] - NEAR)) / 2 / NEAR
+            )
+            position[chosen[part]] = _rank(ranked, ratio[part])
             spread[chosen[part]] = density * distances.noise[chosen[part]]
         if inside.any():
             # Noise alone orders these: all lie somewhere in the stripe's middle part.
-            place[chosen[inside]] = _rank(ranked, way[inside].mean())
+            position[chosen[inside]] = _rank(ranked, ratio[inside].mean())
             spread[chosen[inside]] = inside.mean() * ANYWHERE
-    return place, spread
+    return position, spread
 
 
 def _rank(ranked: NDArray[np.float32], value: NDArray[np.float32]) -> NDArray[np.float32]:

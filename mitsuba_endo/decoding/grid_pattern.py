@@ -165,14 +165,14 @@ class CodedGrid:
         nearest = np.inf
         # Steep pieces may come nearer to the neighbouring row than that row's own piece.
         for candidate in (row - 1, row, row + 1):
-            known = np.clip(candidate, 0, self.rows - 1)
-            rows = np.arange(self.rows)[:, None] if of_rows else known
+            clipped_row = np.clip(candidate, 0, self.rows - 1)
+            rows = np.arange(self.rows)[:, None] if of_rows else clipped_row
             slope = rise[rows, left + 1]
             height = start[rows, left + 1] - slope * (u - left)  # above the row, y points down
             steep = 1 + slope**2
             if of_rows:
-                height, steep = height[known[:, 0]], steep[known[:, 0]]
-            nearest = np.minimum(nearest, (v - known + height) ** 2 / steep)
+                height, steep = height[clipped_row[:, 0]], steep[clipped_row[:, 0]]
+            nearest = np.minimum(nearest, (v - clipped_row + height) ** 2 / steep)
         return nearest + _beyond(u, self.columns) ** 2
 
 

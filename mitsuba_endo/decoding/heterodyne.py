@@ -59,11 +59,11 @@ def bias(
     q: NDArray[np.float32], wrapped: Sequence[NDArray[np.float32]], periods: Sequence[float]
 ) -> float:
     """Return the largest mean misfit of a period, turns; infinite where nothing is known."""
-    known = np.isfinite(q)
-    if not known.any():
+    finite = np.isfinite(q)
+    if not finite.any():
         return np.inf
     return max(
-        abs(float(_wrapped((q - other)[known] / period).mean()))
+        abs(float(_wrapped((q - other)[finite] / period).mean()))
         for other, period in zip(wrapped[:-1], periods[:-1], strict=True)
     )
 

@@ -81,12 +81,12 @@ def read_frames(paths: Sequence[Path]) -> Iterator[ImageFrame]:
         InputError: a file is missing, damaged or of another kind, two images have one name, or a
             folder holds no image.
     """
-    seen: set[str] = set()
+    names: set[str] = set()
     for path in (inside for given in paths for inside in _files(given)):
         for frame in _video(path) if path.suffix.lower() in VIDEOS else _image(path):
-            if frame.name in seen:
+            if frame.name in names:
                 raise InputError("two images have this name", frame.name, "rename one file")
-            seen.add(frame.name)
+            names.add(frame.name)
             yield frame
 
 
@@ -133,8 +133,8 @@ def _image(path: Path) -> Iterator[ImageFrame]:
 
 
 def _video(path: Path) -> Iterator[ImageFrame]:
-    for found, (pixels, note) in enumerate(read_video(path)):
-        yield ImageFrame(f"{path.stem}_{found:05d}", f"{path} frame {found}",
+    for number, (pixels, note) in enumerate(read_video(path)):
+        yield ImageFrame(f"{path.stem}_{number:05d}", f"{path} frame {number}",
                     np.divide(pixels, 255, dtype=np.float32), note)  # fmt: skip
 
 

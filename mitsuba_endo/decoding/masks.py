@@ -52,12 +52,12 @@ class Masks:
         folder, stem = self.path / Path(frame).parent, Path(frame).stem
         names = [name + ending for name in (stem, Path(frame).name) for ending in ENDINGS]
         inside = images_of(folder) if folder.is_dir() else []
-        found = [path for path in inside if path.stem in names]
-        if len(found) != 1:
-            what = "several masks" if found else "no mask"
+        matches = [path for path in inside if path.stem in names]
+        if len(matches) != 1:
+            what = "several masks" if matches else "no mask"
             todo = f"name one {Path(frame).with_suffix('.png')}, or give one for all frames"
             raise InputError(f"holds {what} of frame {frame}", str(self.path), todo)
-        return read_mask(found[0], one_of_many=True)
+        return read_mask(matches[0], one_of_many=True)
 
     def applied(self, map_: CorrespondenceMap) -> CorrespondenceMap:
         """Return a map without the pixels that its mask leaves out.

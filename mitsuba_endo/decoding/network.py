@@ -101,10 +101,10 @@ class Network:
             raise InputError(
                 "ONNX Runtime is not installed", source, 'pip install "mitsuba-endo[decode]"'
             )
-        known = _checksum(weights) == _checksum(_shipped())
+        shipped = _checksum(weights) == _checksum(_shipped())
         # Foreign weights can end the process that runs them.
         self._run: _Runner = (
-            loader(self.engine)(weights) if known else ApartNetwork(weights, source, self.engine)
+            loader(self.engine)(weights) if shipped else ApartNetwork(weights, source, self.engine)
         )
 
     def heads(self, image: NDArray[np.integer] | NDArray[np.floating]) -> Heads:

@@ -29,7 +29,7 @@ CONCENTRATED = 0.6
 def phase_conventions(
     samples: StackSamples,
     plan: StackPlan,
-    place: dict[str, int],
+    image_index: dict[str, int],
     coarse: Sequence[NDArray[np.float32]],
     stated: Stated,
 ) -> Iterator[PhaseConvention]:
@@ -42,11 +42,12 @@ def phase_conventions(
         offsets += [float(str(value)) for value in wanted if value not in offsets]
         if coarse:
             measured = [
-                _offset(samples, plan, axis, place, coarse[k], sign) for k, axis in enumerate(AXES)
+                _offset(samples, plan, axis, image_index, coarse[k], sign)
+                for k, axis in enumerate(AXES)
             ]
             offsets = [o for o in offsets if all(_near(o, m) for m in measured)][:1]
         elif plan.heterodyne:
-            offsets = _unbiased(samples, plan, place, sign, offsets)
+            offsets = _unbiased(samples, plan, image_index, sign, offsets)
         yield from (PhaseConvention(sign, offset) for offset in offsets)
 
 
@@ -65,7 +66,11 @@ def _near(offset: float, measured: float | None) -> bool:
 
 
 def _unbiased(
-    samples: StackSamples, plan: StackPlan, place: dict[str, int], sign: int, offsets: list[float]
+    samples: StackSamples,
+    plan: StackPlan,
+    image_index: dict[str, int],
+    sign: int,
+    offsets: list[float],
 ) -> list[float]:
     """Return the offset under which the periods agree in the mean, and those nearly as good.
 
@@ -74,7 +79,7 @@ def _unbiased(
     misfits = {}
     for offset in offsets:
         phase = PhaseConvention(sign, offset)
-        misfits[offset] = max(_misfit(samples, plan, axis, place, phase) for axis in AXES)
+        misfits[offset] = max(_misfit(samples, plan, axis, image_index, phase) for axis in AXES)
     best = min(misfits.values(), default=np.inf)
     return [o for o in offsets if misfits[o] <= NEARLY * best < np.inf]
 
@@ -83,10 +88,10 @@ def _misfit(
     samples: StackSamples,
     plan: StackPlan,
     axis: Axis,
-    place: dict[str, int],
+    image_index: dict[str, int],
     phase: PhaseConvention,
 ) -> float:
-    waves = samples.axis(plan, axis, place).waves
+    waves = samples.axis(plan, axis, image_index).waves
     wrapped = [
         wrapped_coordinate(images, period, phase)[0][samples.lit]
         for images, period in zip(waves, plan.periods, strict=True)
@@ -99,19 +104,19 @@ def _offset(
     samples: StackSamples,
     plan: StackPlan,
     axis: Axis,
-    place: dict[str, int],
+    image_index: dict[str, int],
     coarse: NDArray[np.float32],
     sign: int,
 ) -> float | None:
     """Return the phase less what the code says, turns; None if the samples do not agree."""
-    waves = samples.axis(plan, axis, place).waves[0]
+    waves = samples.axis(plan, axis, image_index).waves[0]
     share = wrapped_coordinate(waves, 1.0, PhaseConvention(sign))[0]
-    known = np.isfinite(coarse) & samples.lit
+    usable = np.isfinite(coarse) & samples.lit
     if plan.fringe_is_stripe:
-        known &= at_edges(coarse, plan.stripe)
-    if not known.any():
+        usable &= at_edges(coarse, plan.stripe)
+    if not usable.any():
         return None
-    turn = np.exp(2j * np.pi * (share[known] - coarse[known] / plan.periods[0])).mean()
+    turn = np.exp(2j * np.pi * (share[usable] - coarse[usable] / plan.periods[0])).mean()
     return float(np.angle(turn) / (2 * np.pi)) if abs(turn) >= CONCENTRATED else None
 
 
@@ -140,10 +145,10 @@ def periods_agree(
         if q is None:
             q = unroll_coarsest(fine, period, plan.size[axis])
             continue
-        known = lit & np.isfinite(q)
+        usable = lit & np.isfinite(q)
         if plan.fringe_is_stripe:
-            known &= at_edges(q, plan.stripe)
-        turn = np.exp(2j * np.pi * (q - fine)[known] / period).mean() if known.any() else 0
+            usable &= at_edges(q, plan.stripe)
+        turn = np.exp(2j * np.pi * (q - fine)[usable] / period).mean() if usable.any() else 0
         if abs(turn) < CONCENTRATED or abs(np.angle(turn)) > 2 * np.pi * OFF_COARSER:
             return False
         q = refine(q, fine, period, most)

@@ -39,9 +39,9 @@ class AxisMap:
         """Return the map with its differences."""
         if not lit.any() or (lit & np.isinf(q)).sum() > BEYOND * lit.sum():
             return cls(q, width, {}, 0.0)
-        known = np.where(np.isfinite(q), q, np.float32(np.nan))
+        finite = np.where(np.isfinite(q), q, np.float32(np.nan))
         lags = [lag for lag in LAGS if 2 * lag < min(q.shape[1:])]
-        steps = {lag: _differences(known, width, lag) for lag in lags}
+        steps = {lag: _differences(finite, width, lag) for lag in lags}
         shares = [step.smooth[_middle(lit, lag)].mean() for lag, step in steps.items()]
         return cls(q, width, steps, _second_best(shares))
 
@@ -77,14 +77,14 @@ def _differences(q: NDArray[np.float32], width: NDArray[np.float32], lag: int) -
 def _cross(values: NDArray[np.float32], lag: int) -> list[NDArray[np.float32]]:
     """Return the samples and those to the right, left, below and above."""
     middle, ahead, behind = slice(lag, -lag), slice(2 * lag, None), slice(None, -2 * lag)
-    places = (
+    crops = (
         (middle, middle),
         (middle, ahead),
         (middle, behind),
         (ahead, middle),
         (behind, middle),
     )
-    return [values[:, rows, columns] for rows, columns in places]
+    return [values[:, rows, columns] for rows, columns in crops]
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,8 +57,8 @@ class DecodedStack:
     @property
     def weight(self) -> NDArray[np.float32]:
         """(H, W) 1 / variance relative to the best, at most 1; 0 = not known."""
-        known = self.variance[self.decoded]
-        best = float(np.percentile(known, BEST)) if known.size else 1.0
+        variances = self.variance[self.decoded]
+        best = float(np.percentile(variances, BEST)) if variances.size else 1.0
         weight = np.minimum(best / np.where(self.decoded, self.variance, np.inf), 1)
         return weight.astype(np.float32)
 
@@ -120,12 +120,12 @@ def decode_stack(
             f"{len(stack)} images, but this pattern has {len(labels)}",
             "stack", "check the pattern's options against what was projected",
         )  # fmt: skip
-    place = dict(zip(labels, range(len(stack)) if order is None else order, strict=True))
+    image_index = dict(zip(labels, range(len(stack)) if order is None else order, strict=True))
     noise = estimate_noise(stack)
     need = max(min_contrast, CONTRAST_OVER_NOISE * noise)
-    _check_reference(stack, plan, place, need)
+    _check_reference(stack, plan, image_index, need)
     axes = [
-        _decode_axis(stack, plan, axis, place, noise, need, partial(_part, advance, k))
+        _decode_axis(stack, plan, axis, image_index, noise, need, partial(_part, advance, k))
         for k, axis in enumerate(AXES)
     ]
     return _joined(axes, plan, noise, need)
@@ -136,13 +136,13 @@ def _part(advance: Callable[[float], None], axis: int, share: float) -> None:
 
 
 def _check_reference(
-    stack: StackSource, plan: StackPlan, place: dict[str, int], need: float
+    stack: StackSource, plan: StackPlan, image_index: dict[str, int], need: float
 ) -> None:
     if not plan.reference:
         return
     brighter = darker = 0
     for start, stop in row_chunks(stack.shape, 2):
-        white, black = stack.rows([place["white"], place["black"]], start, stop).images
+        white, black = stack.rows([image_index["white"], image_index["black"]], start, stop).images
         brighter += int((white - black >= need).sum())
         darker += int((black - white >= need).sum())
     if darker > brighter:
@@ -156,7 +156,7 @@ def _decode_axis(
     stack: StackSource,
     plan: StackPlan,
     axis: Axis,
-    place: Mapping[str, int],
+    image_index: Mapping[str, int],
     noise: float,
     need: float,
     advance: Callable[[float], None],
@@ -168,12 +168,12 @@ def _decode_axis(
     whole: Any = None
     for start, stop in row_chunks(stack.shape, len(labels), HALO):
         low, high = max(0, start - HALO), min(height, stop + HALO)
-        strip = stack.rows([place[label] for label in labels], low, high)
+        strip = stack.rows([image_index[label] for label in labels], low, high)
         inner = slice(start - low, stop - low)
-        found = _decode_strip(strip, labels, plan, axis, noise, need)
+        decoded = _decode_strip(strip, labels, plan, axis, noise, need)
         light, whole = (
             with_rows(so_far, inner_rows(part, inner), start, height)
-            for so_far, part in zip((light, whole), found, strict=True)
+            for so_far, part in zip((light, whole), decoded, strict=True)
         )
         advance(stop / height)
     assert light is not None, "images have rows"

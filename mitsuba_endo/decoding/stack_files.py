@@ -73,16 +73,16 @@ def check_names(paths: Sequence[ImageSource], plan: StackPlan) -> None:
         InputError: images are missing, too many or in another order.
     """
     labels = plan.labels()
-    found = [_label(path) for path in paths]
-    missing = [label for label in labels if label not in found]
-    if None not in found and missing:
+    labels_named = [_label(path) for path in paths]
+    missing = [label for label in labels if label not in labels_named]
+    if None not in labels_named and missing:
         raise InputError(f"the image of {missing[0]} is missing", "stack", "add it")
     if len(paths) != len(labels):
         raise InputError(
             f"{len(paths)} images, but this pattern has {len(labels)}", "stack",
             f"give {_abridged(labels)}",
         )  # fmt: skip
-    for path, label, name in zip(paths, labels, found, strict=True):
+    for path, label, name in zip(paths, labels, labels_named, strict=True):
         if name is not None and name != label:
             raise InputError(
                 f"stands where {label} is expected", str(path), "put the images in order"

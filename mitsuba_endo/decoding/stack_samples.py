@@ -43,28 +43,28 @@ class StackSamples:
         high, low = lit.max(0), lit.min(0)
         return (2 * lit - high - low) / np.maximum(high - low, np.float32(1e-6))
 
-    def balanced(self, plan: StackPlan, place: dict[str, int]) -> bool:
+    def balanced(self, plan: StackPlan, image_index: dict[str, int]) -> bool:
         """Tell whether each bit and its inverse, and the steps of each period, cancel out."""
         groups = [steps for axis in AXES for steps in plan.phase_labels(axis)]
         if plan.inverse:
             pairs = (zip(plan.bit_labels(a), plan.inverse_labels(a), strict=True) for a in AXES)
             groups += [list(pair) for axis in pairs for pair in axis]
-        means = (self.light[[place[label] for label in group]].mean(0) for group in groups)
+        means = (self.light[[image_index[label] for label in group]].mean(0) for group in groups)
         return all(float(np.median(np.abs(mean))) <= 2 * BALANCE for mean in means)
 
-    def fine_bits_vary(self, plan: StackPlan, place: dict[str, int]) -> bool:
+    def fine_bits_vary(self, plan: StackPlan, image_index: dict[str, int]) -> bool:
         """Tell whether the finest bits vary.
 
         Else a white image passes for one, where only half of the pattern is seen.
         """
         finest = [label for axis in AXES for label in plan.bit_labels(axis)[-FINEST:]]
-        bright = (self.light[[place[label] for label in finest]] > 0).mean(1)
+        bright = (self.light[[image_index[label] for label in finest]] > 0).mean(1)
         return bool((np.minimum(bright, 1 - bright) >= CONSTANT).all())
 
-    def axis(self, plan: StackPlan, axis: Axis, place: dict[str, int]) -> AxisImages:
+    def axis(self, plan: StackPlan, axis: Axis, image_index: dict[str, int]) -> AxisImages:
         """Return the images of an axis, of a plan whose labels lie at these places."""
         labels = labels_needed(plan, axis)
-        return axis_images({label: self.images[place[label]] for label in labels}, plan, axis)
+        return axis_images({label: self.images[image_index[label]] for label in labels}, plan, axis)
 
 
 def take_samples(stack: StackSource, noise: float, need: float) -> StackSamples:

@@ -44,14 +44,14 @@ class StripeReading:
     """Stripe, of those 2^left_out times as wide as the narrowest."""
     left_out: NDArray[np.uint8]
     """Finest bits that cannot be read; NONE where the stripe is not known."""
-    way: NDArray[np.float32]
+    ratio: NDArray[np.float32]
     noise: NDArray[np.float16]
     kind: NDArray[np.uint8]
     inside: NDArray[np.bool_]
     """As of :class:`EdgeDistances`."""
 
     @property
-    def known(self) -> NDArray[np.bool_]:
+    def valid(self) -> NDArray[np.bool_]:
         """(H, W) pixels that have a stripe."""
         return self.left_out != NONE
 
@@ -89,7 +89,7 @@ def read_bits(images: AxisImages, plan: StackPlan, axis: Axis, noise: float) -> 
     for level in range(most_left_out(plan, axis) + 1):
         # Where Gray bits are in doubt, the pixel lies in the middle of what the coarser ones tell,
         # so one more is left out; of binary ones, at an end of it.
-        at = (wanted <= level) & ~reading.known if plan.code == "gray" else wanted == level
+        at = (wanted <= level) & ~reading.valid if plan.code == "gray" else wanted == level
         if not at.any():
             continue
         kept = slice(None, len(signal) - level)
@@ -97,7 +97,7 @@ def read_bits(images: AxisImages, plan: StackPlan, axis: Axis, noise: float) -> 
         certain &= number < stripe_count(plan.size[axis], plan.stripe * 2**level)
         reading.index[at], reading.left_out[at] = number, np.where(certain, level, NONE)
         edges = edge_distances(number, signal[kept, at], relative[kept, at], plan.code)
-        for name in ("way", "noise", "kind", "inside"):
+        for name in ("ratio", "noise", "kind", "inside"):
             getattr(reading, name)[at] = getattr(edges, name)
     return reading
 
@@ -116,16 +116,16 @@ def coarse_coordinate(reading: StripeReading, plan: StackPlan, axis: Axis) -> ND
     Of stripes that are fringes, the edges near which a pixel lies: there its fringe may be the
     neighbour's, which its phase tells.
     """
-    place = thirds(reading.way) if plan.fringe_is_stripe else np.float32(0.5)
-    return _coordinate(reading, place, plan, axis)
+    position = thirds(reading.ratio) if plan.fringe_is_stripe else np.float32(0.5)
+    return _coordinate(reading, position, plan, axis)
 
 
-def thirds(way: NDArray[np.float32]) -> NDArray[np.float32]:
+def thirds(ratio: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return 0 near a stripe's lower edge, 1 near its upper one, a half between them.
 
     Near is a pixel whose bit at that edge has turned half as far as the one at the other edge.
     """
-    return np.float32(0.5) * (way > 1 / 3) + np.float32(0.5) * (way > 2 / 3)
+    return np.float32(0.5) * (ratio > 1 / 3) + np.float32(0.5) * (ratio > 2 / 3)
 
 
 def fine_coordinate(
@@ -135,36 +135,36 @@ def fine_coordinate(
 
     The whole image at once: how often a place is seen tells where it lies.
     """
-    place = np.full(reading.left_out.shape, np.float32(0.5))
-    spread = np.full(place.shape, np.float32(np.nan))
-    for level in np.unique(reading.left_out[reading.known]).tolist():
+    position = np.full(reading.left_out.shape, np.float32(0.5))
+    spread = np.full(position.shape, np.float32(np.nan))
+    for level in np.unique(reading.left_out[reading.valid]).tolist():
         at = reading.left_out == level
-        edges = EdgeDistances(reading.way[at], reading.noise[at], reading.kind[at],
+        edges = EdgeDistances(reading.ratio[at], reading.noise[at], reading.kind[at],
                               reading.inside[at])  # fmt: skip
-        place[at], share = place_within(edges)
+        position[at], share = place_within(edges)
         last = stripe_count(plan.size[axis], plan.stripe * 2**level) - 1
         # Where the pattern ends, light from beyond it is missing in the blur.
         border = np.minimum(reading.index[at], last - reading.index[at]) < BORDER
         spread[at] = np.hypot(share, border * ANYWHERE) * (plan.stripe * 2**level)
-    return _coordinate(reading, place, plan, axis), spread
+    return _coordinate(reading, position, plan, axis), spread
 
 
 def _coordinate(
-    reading: StripeReading, place: NDArray[np.float32] | np.float32, plan: StackPlan, axis: Axis
+    reading: StripeReading, position: NDArray[np.float32] | np.float32, plan: StackPlan, axis: Axis
 ) -> NDArray[np.float32]:
-    left_out = np.where(reading.known, reading.left_out, np.uint8(0)).astype(np.int32)
+    left_out = np.where(reading.valid, reading.left_out, np.uint8(0)).astype(np.int32)
     # In place and in 32 bits: these arrays are as large as the image.
     wide = np.ldexp(np.float32(plan.stripe), left_out)
     q = reading.index.astype(np.float32)
     if plan.stripe % 1:
         # Stripes begin at whole pixels.
         begin, end = np.ceil(q * wide - BEGIN), np.ceil((q + 1) * wide - BEGIN)
-        q = begin + place * (end - begin)
+        q = begin + position * (end - begin)
     else:
-        q += place
+        q += position
         q *= wide
     q -= np.float32(0.5)
     # The last stripe may be cut off by the pattern's end.
     np.minimum(q, np.float32(plan.size[axis] - 0.5), out=q)
-    q[~reading.known] = np.nan
+    q[~reading.valid] = np.nan
     return q

@@ -29,7 +29,7 @@ def read_video(path: Path) -> Iterator[tuple[NDArray[np.uint8], str]]:
     with quiet():
         video = cv2.VideoCapture(str(path))
     try:
-        found = 0
+        count = 0
         _check(video, path)
         note = _note(video, path)
         while True:
@@ -38,10 +38,10 @@ def read_video(path: Path) -> Iterator[tuple[NDArray[np.uint8], str]]:
             if not read:
                 break
             yield np.asarray(pixels, np.uint8), note
-            found += 1
+            count += 1
     finally:
         video.release()
-    if not found:
+    if not count:
         raise InputError("is not a readable video", str(path), "convert it, e.g. to PNG images")
 
 

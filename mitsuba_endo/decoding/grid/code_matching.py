@@ -122,11 +122,13 @@ class CodeMatcher:
             best - second >= settings.window_margin
         )
         wanted: Counter[PatternOffset] = Counter()
-        for seen, match in zip(corner[good], evidence.argmax(1)[good], strict=True):
-            turn, *place = corner_of[match].tolist()
+        for image_corner, match in zip(corner[good], evidence.argmax(1)[good], strict=True):
+            turn, *pattern_corner = corner_of[match].tolist()
             # Upside down, the window's first node is the last of the pattern's window.
             away = settings.window - 1 if turn < 0 else 0
-            column, row = (int(p + away - turn * s) for p, s in zip(place, seen, strict=True))
+            column, row = (
+                int(p + away - turn * s) for p, s in zip(pattern_corner, image_corner, strict=True)
+            )
             wanted[PatternOffset(turn, column, row)] += 1
         return [offset for offset, _ in wanted.most_common(settings.window_offsets)]
 

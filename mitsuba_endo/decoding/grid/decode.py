@@ -97,9 +97,9 @@ def decode_heads(
     half = np.array([pattern.width, pattern.height], np.float32) / 2
     q[larger((q - half + 0.5) / half) > 1] = np.nan
     q[~locally_consistent(q, pattern.period * settings.neighbour_slack)] = np.nan
-    known = np.isfinite(q[..., 0])
-    confidence = np.where(known, heads.confidence, 0).astype(np.float32)
-    reason = "" if known.any() else _reason(graph, settings.least_nodes)
+    valid = np.isfinite(q[..., 0])
+    confidence = np.where(valid, heads.confidence, 0).astype(np.float32)
+    reason = "" if valid.any() else _reason(graph, settings.least_nodes)
     return DecodedGrid(q, confidence, graph, assignment, reason)
 
 

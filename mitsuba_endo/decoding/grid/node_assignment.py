@@ -256,8 +256,8 @@ def assign_by_single_links(
     target = np.concatenate([links.end, links.start])
     step = assignment.turn * np.concatenate([links.step, -links.step])
     for _ in range(matcher.settings.single_links):
-        known = assignment.assigned
-        ahead = known[source] & ~known[target] & (graph.component[target] < 0)
+        assigned = assignment.assigned
+        ahead = assigned[source] & ~assigned[target] & (graph.component[target] < 0)
         claimed = assignment.node[source[ahead]] + step[ahead]
         assignment = _with_claims(assignment, target[ahead], claimed, matcher)
     return assignment
@@ -272,13 +272,13 @@ def _with_claims(
     """Assign nodes (K,) to columns and rows (K, 2), if free, unopposed and of the right code."""
     rows = np.unique(np.column_stack([target, claimed])[matcher.inside(claimed)], axis=0)
     target, claimed = rows[:, 0], rows[:, 1:]
-    width, known = matcher.code.shape[1], assignment.node[assignment.assigned]
+    width, taken = matcher.code.shape[1], assignment.node[assignment.assigned]
     flat = claimed[:, 1] * width + claimed[:, 0]
     fits = matcher.among(target).at(claimed) >= matcher.settings.single_evidence
     # Another claim of the node, or of its place, contradicts this one.
     for claim in (target, flat):
         fits &= np.bincount(claim)[claim] == 1
-    fits &= ~np.isin(flat, known[:, 1] * width + known[:, 0])
+    fits &= ~np.isin(flat, taken[:, 1] * width + taken[:, 0])
     assigned, node = assignment.assigned.copy(), assignment.node.copy()
     assigned[target[fits]] = True
     node[target[fits]] = claimed[fits]

@@ -59,10 +59,10 @@ def unwrap(
     order, closed = _orders_of_nodes(regions, nodes, assignment)
     for _ in range(settings.spread_rounds):
         order = _spread(regions, order, closed, settings.spread_share)
-    known = (order[:, 0] != UNKNOWN)[regions.number] & usable
-    known &= ~_contradicted(regions, order, settings.conflict_margin)
+    resolved = (order[:, 0] != UNKNOWN)[regions.number] & usable
+    resolved &= ~_contradicted(regions, order, settings.conflict_margin)
     lattice = assignment.turn * (order[regions.number] + heads.phase)
-    lattice = np.where(known[..., None], lattice, np.nan).astype(np.float32)
+    lattice = np.where(resolved[..., None], lattice, np.nan).astype(np.float32)
     return smoothed_by_planes(lattice, heads.confidence, settings)
 
 
@@ -160,11 +160,11 @@ def smoothed_by_planes(
         confidence: (H, W) probability that the network's phase is right.
         settings: thresholds.
     """
-    known = np.isfinite(lattice[..., 0])
-    weight = np.where(known, confidence**2, 0).astype(np.float32)
+    valid = np.isfinite(lattice[..., 0])
+    weight = np.where(valid, confidence**2, 0).astype(np.float32)
     low, high = settings.plane_confidence
-    share = np.where(known, np.clip((high - confidence) / (high - low), 0, 1), 0)
-    values = np.where(known[..., None], lattice, 0)
+    share = np.where(valid, np.clip((high - confidence) / (high - low), 0, 1), 0)
+    values = np.where(valid[..., None], lattice, 0)
     plane, residual = _fitted_planes(values, weight, settings)
     change = plane - values
     share[(larger(change) > settings.plane_change) | (residual > settings.plane_residual)] = 0
