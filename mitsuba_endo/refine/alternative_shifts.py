@@ -63,10 +63,16 @@ def contest(frame: Comparison, refined: Refined) -> tuple[Image, Image]:
         value = frame.pattern.brightness(q + shift, refined.blur)
         sums += [_mean(weight * value), _mean(weight * value**2), _mean(weight * value * light)]
     m = windows.moments(sums)
-    found = [_correlation(*(m.of(0, i) for i in (0, 1, 2, 3 * k + 3, 3 * k + 4, 3 * k + 5)))
-             for k in range(len(shifts))]  # fmt: skip
-    best = np.max(found[1:], 0) if len(found) > 1 else np.full_like(found[0], -1)
-    own, alternative = (c.reshape(windows.shape).astype(np.float32) for c in (found[0], best))
+    correlations = [
+        _correlation(*(m.of(0, i) for i in (0, 1, 2, 3 * k + 3, 3 * k + 4, 3 * k + 5)))
+        for k in range(len(shifts))
+    ]
+    best = (
+        np.max(correlations[1:], 0) if len(correlations) > 1 else np.full_like(correlations[0], -1)
+    )
+    own, alternative = (
+        c.reshape(windows.shape).astype(np.float32) for c in (correlations[0], best)
+    )
     return own, alternative
 
 

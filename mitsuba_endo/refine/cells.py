@@ -40,13 +40,13 @@ class Links:
         return np.asarray(cv2.dilate(lone, np.ones((3, 3), np.uint8)) > 0)
 
     @cached_property
-    def beside_folds(self) -> "list[Near]":
+    def lone_interpolations(self) -> "list[CellInterpolation]":
         """How each pixel of a lone cell is interpolated, by its place in the cell."""
         rows, columns = np.nonzero(self.lone)
         offsets = range(-(SIDE // 2), SIDE // 2 + 1)
-        return [_near(self, rows, columns, dx, dy) for dy in offsets for dx in offsets]
+        return [_interpolation(self, rows, columns, dx, dy) for dy in offsets for dx in offsets]
 
-    def open_to(self, rows: NDArray, columns: NDArray, x: int, y: int) -> NDArray[np.float32]:
+    def linked_to(self, rows: NDArray, columns: NDArray, x: int, y: int) -> NDArray[np.float32]:
         """Return 1 where cells are linked to their neighbour (x, y), along one axis, else 0."""
         link, at = (self.right, columns) if x else (self.down, rows)
         count = link.shape[1 if x else 0]
@@ -55,12 +55,12 @@ class Links:
         first = at + min(x + y, 0)
         inside = (first >= 0) & (first < count)
         first = np.clip(first, 0, count - 1)
-        found = link[rows, first] if x else link[first, columns]
-        return (found & inside).astype(np.float32)
+        linked = link[rows, first] if x else link[first, columns]
+        return (linked & inside).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
-class Near:
+class CellInterpolation:
     """Interpolation of N pixels, one in each of N cells, between four cells."""
 
     rows: NDArray[np.intp]
@@ -74,20 +74,22 @@ class Near:
     """(4, 2) the pixel's distance from the cells' middles, pixels."""
 
 
-def _near(links: Links, rows: NDArray, columns: NDArray, dx: int, dy: int) -> Near:
+def _interpolation(
+    links: Links, rows: NDArray, columns: NDArray, dx: int, dy: int
+) -> CellInterpolation:
     """Return the interpolation of the pixels ``dx``, ``dy`` from the middles of cells (N,)."""
     h, w = links.shape
     tx, ty = abs(dx) / SIDE, abs(dy) / SIDE
     sx, sy = int(np.sign(dx)), int(np.sign(dy))
-    across, down = links.open_to(rows, columns, sx, 0), links.open_to(rows, columns, 0, sy)
-    corner = across * links.open_to(rows, np.clip(columns + sx, 0, w - 1), 0, sy)
+    across, down = links.linked_to(rows, columns, sx, 0), links.linked_to(rows, columns, 0, sy)
+    corner = across * links.linked_to(rows, np.clip(columns + sx, 0, w - 1), 0, sy)
     shares = [np.full(len(rows), (1 - tx) * (1 - ty), np.float32), tx * (1 - ty) * across,
               (1 - tx) * ty * down, tx * ty * corner]  # fmt: skip
     steps = np.array([(0, 0), (sx, 0), (0, sy), (sx, sy)])
     weights = np.stack(shares, -1)
     cells = (np.clip(rows[:, None] + steps[:, 1], 0, h - 1) * w
              + np.clip(columns[:, None] + steps[:, 0], 0, w - 1))  # fmt: skip
-    return Near(
+    return CellInterpolation(
         rows * SIDE + SIDE // 2 + dy, columns * SIDE + SIDE // 2 + dx, cells,
         (weights / weights.sum(-1, keepdims=True)).astype(np.float32),
         (np.array([dx, dy]) - SIDE * steps).astype(np.float32),
@@ -132,10 +134,10 @@ def blend(value: Image, links: Links, slope: Image | None = None) -> Image:
     value = np.ascontiguousarray(value, np.float32)
     plain = cv2.resize(value, (w * SIDE, h * SIDE), interpolation=cv2.INTER_LINEAR)
     out = np.asarray(plain, np.float32).reshape(h * SIDE, w * SIDE, channels)
-    for near in links.beside_folds:
-        found = value.reshape(-1, channels)[near.cells]
+    for near in links.lone_interpolations:
+        values = value.reshape(-1, channels)[near.cells]
         if slope is not None:
             rise = np.einsum("nfkd,fd->nfk", slope.reshape(-1, channels, 2)[near.cells], near.away)
-            found = found + rise
-        out[near.rows, near.columns] = np.einsum("nf,nfk->nk", near.weights, found)
+            values = values + rise
+        out[near.rows, near.columns] = np.einsum("nf,nfk->nk", near.weights, values)
     return out

@@ -47,9 +47,9 @@ def decoded_map(
     plain = CorrespondenceMap(decoded.q, name, decoded.weight)
     if not refine or decoded.reason:
         return DecodedMap(plain, decoded.confidence, None)
-    found = refine_map(plain, image, grid_image(grid))
-    confidence = confidence_of(found.map, decoded.confidence, grid.period)
-    return DecodedMap(found.map, confidence, found)
+    refined = refine_map(plain, image, grid_image(grid))
+    confidence = confidence_of(refined.map, decoded.confidence, grid.period)
+    return DecodedMap(refined.map, confidence, refined)
 
 
 def confidence_of(

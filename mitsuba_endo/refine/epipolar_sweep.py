@@ -72,16 +72,16 @@ def sweep(
         blur: of the pattern, pattern pixels.
         sigma: standard deviation of the windows of comparison, camera pixels.
     """
-    places = _places(geometry, view.light.shape)
-    correlation = _correlations(places, view, pattern, blur, sigma)
+    coordinates = _coordinates(geometry, view.light.shape)
+    correlation = _correlations(coordinates, view, pattern, blur, sigma)
     cost = aggregated(1 - correlation, NEIGHBOUR, JUMP)
     best = cost.argmin(-1)[..., None]
-    q = np.take_along_axis(places, best[..., None], 2)[:, :, 0]
-    other = np.linalg.norm(places - q[:, :, None], axis=-1) > APART
+    q = np.take_along_axis(coordinates, best[..., None], 2)[:, :, 0]
+    other = np.linalg.norm(coordinates - q[:, :, None], axis=-1) > APART
     rival = np.where(other, cost, np.inf).min(-1)
     margin = rival - np.take_along_axis(cost, best, -1)[..., 0]
-    last = places.shape[2] - 1
-    ends = [np.take_along_axis(places, np.clip(best + k, 0, last)[..., None], 2)[:, :, 0]
+    last = coordinates.shape[2] - 1
+    ends = [np.take_along_axis(coordinates, np.clip(best + k, 0, last)[..., None], 2)[:, :, 0]
             for k in (1, -1)]  # fmt: skip
     along = ends[0] - ends[1]
     along = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
@@ -89,22 +89,22 @@ def sweep(
     return Sweep(q, along.astype(np.float32), np.where(held, margin, -1).astype(np.float32))
 
 
-def _places(geometry: KnownGeometry, shape: tuple[int, ...]) -> NDArray[np.float32]:
+def _coordinates(geometry: KnownGeometry, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Return coordinates (h, w, K, 2) of the cells' middles at all inverse ranges."""
     x, y = (np.arange(SIDE // 2, n, SIDE, dtype=float) for n in (shape[1], shape[0]))
-    ways = geometry.camera.rays(np.stack(np.meshgrid(x, y), -1))
+    rays = geometry.camera.rays(np.stack(np.meshgrid(x, y), -1))
     near = padded(1 / geometry.range.astype(float), np.nan)[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE]
     around = _filled(near)[..., None] * np.geomspace(FARTHEST, NEAREST, HYPOTHESES)
-    points = geometry.projector_from_camera.apply(ways[:, :, None] / around[..., None])
+    points = geometry.projector_from_camera.apply(rays[:, :, None] / around[..., None])
     return geometry.projector.project(points).astype(np.float32)
 
 
 def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return values (h, w) with the missing ones from wider and wider averages of those known."""
-    known = np.isfinite(values)
-    out = np.full(values.shape, values[known].mean())
+    finite = np.isfinite(values)
+    out = np.full(values.shape, values[finite].mean())
     todo = np.ones(values.shape, bool)
-    sums = [np.where(known, values, 0), known.astype(float)]
+    sums = [np.where(finite, values, 0), finite.astype(float)]
     for spread in SPREADS:
         total, weight = (np.asarray(cv2.GaussianBlur(f, (0, 0), spread,
                                                      borderType=cv2.BORDER_CONSTANT))
@@ -116,7 +116,11 @@ def _filled(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _correlations(
-    places: NDArray[np.float32], view: ImageView, pattern: PatternImage, blur: float, sigma: float
+    coordinates: NDArray[np.float32],
+    view: ImageView,
+    pattern: PatternImage,
+    blur: float,
+    sigma: float,
 ) -> NDArray[np.float32]:
     """Return zero-mean normalised correlations (h, w, K); -1 off the pattern."""
     even = np.asarray(cv2.GaussianBlur(np.maximum(view.light, 0), (0, 0), sigma))
@@ -125,17 +129,17 @@ def _correlations(
     w, s, ss = (_window(f, sigma) for f in (weight, lit, lit * view.light))
     n = np.maximum(w, 1e-9)
     size = view.light.shape[::-1]
-    out = np.empty(places.shape[:3], np.float32)
-    for k in range(places.shape[2]):
-        place = np.ascontiguousarray(places[:, :, k])
+    out = np.empty(coordinates.shape[:3], np.float32)
+    for k in range(coordinates.shape[2]):
+        middles = np.ascontiguousarray(coordinates[:, :, k])
         q = np.asarray(
-            cv2.resize(np.nan_to_num(place), size, interpolation=cv2.INTER_LINEAR), np.float32
+            cv2.resize(np.nan_to_num(middles), size, interpolation=cv2.INTER_LINEAR), np.float32
         )
         value = pattern.brightness(q, blur)
         t, tt, both = (_window(f, sigma) for f in (weight * value, weight * value**2, lit * value))
         power = (ss - s * s / n) * (tt - t * t / n)
-        found = (both - s * t / n) / np.sqrt(np.maximum(power, 1e-9 * n * n))
-        out[:, :, k] = np.where(pattern.holds(place), found, -1)
+        correlation = (both - s * t / n) / np.sqrt(np.maximum(power, 1e-9 * n * n))
+        out[:, :, k] = np.where(pattern.holds(middles), correlation, -1)
     return out
 
 

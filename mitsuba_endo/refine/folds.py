@@ -20,10 +20,10 @@ def find_links(q: Image) -> Links:
     the coordinate of the nearest known one, and the surface may change the more the farther those
     are: so the sides of a fold are told apart also if the decoder left a gap between them.
     """
-    known = np.asarray(np.isfinite(q[..., 0]))
-    filled, away = _nearest(q, known)
+    valid = np.asarray(np.isfinite(q[..., 0]))
+    filled, away = _nearest(q, valid)
     across, down = (np.asarray(np.abs(np.diff(filled, axis=axis)).max(-1)) for axis in (1, 0))
-    steps = np.concatenate([across[known[:, 1:] & known[:, :-1]], down[known[1:] & known[:-1]]])
+    steps = np.concatenate([across[valid[:, 1:] & valid[:, :-1]], down[valid[1:] & valid[:-1]]])
     usual = float(np.median(steps)) if steps.size else 0.0
     slack = max(JUMP_PX, JUMP_OVER_STEP * usual)
     gap_across, gap_down = away[:, 1:] + away[:, :-1], away[1:] + away[:-1]
@@ -32,16 +32,16 @@ def find_links(q: Image) -> Links:
     return _between_cells(torn[0], torn[1])
 
 
-def _nearest(q: Image, known: NDArray[np.bool_]) -> tuple[Image, Image]:
+def _nearest(q: Image, valid: NDArray[np.bool_]) -> tuple[Image, Image]:
     """Return q with missing pixels filled from the nearest known, and the distance to those."""
-    if known.all() or not known.any():
-        return np.nan_to_num(q), np.zeros(known.shape, np.float32)
-    away, found = cv2.distanceTransformWithLabels(
-        (~known).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+    if valid.all() or not valid.any():
+        return np.nan_to_num(q), np.zeros(valid.shape, np.float32)
+    away, nearest = cv2.distanceTransformWithLabels(
+        (~valid).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
     )
-    labels = np.asarray(found, np.intp)
+    labels = np.asarray(nearest, np.intp)
     source = np.zeros(labels.max() + 1, np.intp)
-    source[labels[known]] = np.flatnonzero(known)
+    source[labels[valid]] = np.flatnonzero(valid)
     return q.reshape(-1, 2)[source[labels]], np.asarray(away, np.float32)
 
 

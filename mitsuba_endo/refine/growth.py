@@ -70,16 +70,18 @@ def grow(
     start = np.where(
         repeated(wanted)[..., None], smoother.pixels(grown.q * sure[..., None]), grown.q
     )
-    seen = (repeated(grown.good | wanted) & frame.view.clear).astype(np.float32)
-    wider = replace(frame, usable=seen)
-    found = iterate(wider, start.astype(np.float32), replace(options, iterations=STEPS, blur=blur))
-    covariance = cell_covariance(wider, found)
-    verdict = judge(wider, found, covariance)
-    added = wanted & verdict.good & (np.linalg.norm(found.moved, axis=-1) < MOVED)
+    usable = (repeated(grown.good | wanted) & frame.view.clear).astype(np.float32)
+    wider = replace(frame, usable=usable)
+    refined = iterate(
+        wider, start.astype(np.float32), replace(options, iterations=STEPS, blur=blur)
+    )
+    covariance = cell_covariance(wider, refined)
+    verdict = judge(wider, refined, covariance)
+    added = wanted & verdict.good & (np.linalg.norm(refined.moved, axis=-1) < MOVED)
     for value, share in ((verdict.correlation, CLEAR), (verdict.margin, SURE)):
         added &= value > share * float(np.median(value[grown.good]))
     added &= np.maximum(covariance[..., 0], covariance[..., 2]) < KNOWN**2
-    added &= frame.pattern.holds(found.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE])
-    q = np.where(repeated(added)[..., None], without_pull(wider, found), grown.q)
+    added &= frame.pattern.holds(refined.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE])
+    q = np.where(repeated(added)[..., None], without_pull(wider, refined), grown.q)
     kept = np.where(added[..., None], covariance, grown.covariance)
     return Grown(q, kept, grown.good | added, grown.added | added)

@@ -53,9 +53,9 @@ class ImageDecoder:
             InputError: it is of another size than the rig's camera.
         """
         _check_size(frame, self._rig)
-        found = decode_image(frame.image, self._network, self._grid)
-        map_ = decoded_map(frame.image, found, self._grid, frame.name, refine=self._refine)
-        return DecodedImage(found, map_)
+        decoded = decode_image(frame.image, self._network, self._grid)
+        map_ = decoded_map(frame.image, decoded, self._grid, frame.name, refine=self._refine)
+        return DecodedImage(decoded, map_)
 
 
 def _check_size(frame: ImageFrame, rig: Rig) -> None:

@@ -28,13 +28,13 @@ class ImageView:
 
 
 def view_of(
-    image: NDArray[np.integer] | NDArray[np.floating], known: NDArray[np.bool_], gamma: float
+    image: NDArray[np.integer] | NDArray[np.floating], valid: NDArray[np.bool_], gamma: float
 ) -> ImageView:
     """Return what is to be looked at of an image.
 
     Args:
         image: (H, W) or (H, W, 3), 8 or 16 bit, or floats where 1 is full scale.
-        known: (H, W) pixels with a coordinate.
+        valid: (H, W) pixels with a coordinate.
         gamma: the image holds brightness^(1 / gamma).
 
     Raises:
@@ -42,7 +42,7 @@ def view_of(
     """
     gray = one_channel(image)
     light = np.sign(gray) * np.abs(gray) ** np.float32(gamma)
-    middle = float(np.median(light[known])) if known.any() else 0.0
+    middle = float(np.median(light[valid])) if valid.any() else 0.0
     light = light / max(middle, 1e-6)
     bright = (_largest(image) >= SATURATED).astype(np.uint8)
     clear = cv2.dilate(bright, HALO) == 0

@@ -101,17 +101,17 @@ def iterate(
     moved = np.zeros((*frame.windows.shape, 2), np.float32)
     base = moved
     blur = options.blur or blur or FIRST_BLUR
-    found = None
+    refined = None
     for k in range(max(1, options.iterations)):
-        found = _linearise(frame, start, base, moved, blur, found)
-        moved = found.moved
+        refined = _linearise(frame, start, base, moved, blur, refined)
+        moved = refined.moved
         if options.blur is None and k < FITTED:
-            blur = _fitted_blur(frame, found)
-        if float(np.sqrt(np.mean(found.step**2))) < ENOUGH:
+            blur = _fitted_blur(frame, refined)
+        if float(np.sqrt(np.mean(refined.step**2))) < ENOUGH:
             break
         base = frame.smoother.of_cells(moved)
-    assert found is not None
-    return replace(found, q=start + blend(moved, frame.links))
+    assert refined is not None
+    return replace(refined, q=start + blend(moved, frame.links))
 
 
 def _linearise(
@@ -160,15 +160,17 @@ def _ridges(scale: float) -> Ridges:
     return Ridges(slope=variance / GAIN_SLOPE**2, shift=variance / SHIFT**2)
 
 
-def _fitted_blur(frame: Comparison, found: Refined) -> float:
+def _fitted_blur(frame: Comparison, refined: Refined) -> float:
     """Return the blur to go on with: one linear step of its variance s, for dT/ds = T''/2."""
-    gain = blend(_grid(frame, found.fit.gain[:, None]), frame.links)[..., 0]
-    broadening = gain * frame.pattern.laplacian(found.q, found.blur)
-    power = float((found.weight * broadening**2).sum())
+    gain = blend(_grid(frame, refined.fit.gain[:, None]), frame.links)[..., 0]
+    broadening = gain * frame.pattern.laplacian(refined.q, refined.blur)
+    power = float((refined.weight * broadening**2).sum())
     if power == 0:
-        return found.blur
-    more = float((found.weight * broadening * (frame.view.light - found.predicted)).sum()) / power
-    best = float(np.sqrt(max(found.blur**2 + 2 * more, 0)))
+        return refined.blur
+    more = (
+        float((refined.weight * broadening * (frame.view.light - refined.predicted)).sum()) / power
+    )
+    best = float(np.sqrt(max(refined.blur**2 + 2 * more, 0)))
     return float(np.clip(CORE * best, *BLURS))
 
 

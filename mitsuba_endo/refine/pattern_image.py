@@ -58,8 +58,8 @@ class PatternImage:
             q: (H, W, 2) pattern pixels, finite; beyond the pattern its border goes on.
             blur: standard deviation of the blur, pattern pixels.
         """
-        found = cv2.split(self._at(q, self._blurred(_level(blur))[0]))
-        value, x, y = (np.asarray(plane, np.float32) for plane in found)
+        planes = cv2.split(self._at(q, self._blurred(_level(blur))[0]))
+        value, x, y = (np.asarray(plane, np.float32) for plane in planes)
         return value, x, y
 
     def brightness(self, q: Image, blur: float) -> Image:
@@ -106,8 +106,8 @@ def _derivative(image: Image, axis: int, scale: np.float32) -> Image:
     one = np.ones((1, 1), np.float32)
     row, column = (kernel, one) if axis == 0 else (one, kernel)
     border = cv2.BORDER_REPLICATE
-    found = cv2.sepFilter2D(np.ascontiguousarray(image), -1, row, column, borderType=border)
-    return np.asarray(found, np.float32)
+    differences = cv2.sepFilter2D(np.ascontiguousarray(image), -1, row, column, borderType=border)
+    return np.asarray(differences, np.float32)
 
 
 @lru_cache(4)

@@ -77,15 +77,15 @@ def refine_map(
     options = options or RefineOptions()
     check_start(start, image, pattern)
     frame, q = prepare(start, image, pattern, options)
-    found = iterate(frame, q, options)
-    covariance = cell_covariance(frame, found)
-    verdict = judge(frame, found, covariance)
+    refined = iterate(frame, q, options)
+    covariance = cell_covariance(frame, refined)
+    verdict = judge(frame, refined, covariance)
     share = float(repeated(verdict.good)[padded(start.valid, False)].mean())
     if share < LEAST:
         reason = f"the image confirms {100 * share:.1f} % of the map's pixels"
-        return RefinedMap(start, 0.0, 0, 0, found.blur, reason)
-    grown = _grown(frame, found, covariance, verdict, options)
-    return _merged(start, frame.links, grown, verdict, share, options, found.blur)
+        return RefinedMap(start, 0.0, 0, 0, refined.blur, reason)
+    grown = _grown(frame, refined, covariance, verdict, options)
+    return _merged(start, frame.links, grown, verdict, share, options, refined.blur)
 
 
 def check_start(start: CorrespondenceMap, image: NDArray, pattern: PatternImage) -> None:
@@ -95,12 +95,12 @@ def check_start(start: CorrespondenceMap, image: NDArray, pattern: PatternImage)
             f"{start.q.shape[1]} x {start.q.shape[0]}", start.name,
             "give the image that the map was decoded from",
         )  # fmt: skip
-    known = start.q[start.valid]
-    if not len(known):
+    coordinates = start.q[start.valid]
+    if not len(coordinates):
         raise InputError("the map has no finite value", start.name, "check how it was decoded")
-    low, high = known.min(0), known.max(0)
+    low, high = coordinates.min(0), coordinates.max(0)
     size = np.array([pattern.width, pattern.height])
-    if float(np.mean(~pattern.holds(known))) > STRAY:
+    if float(np.mean(~pattern.holds(coordinates))) > STRAY:
         raise InputError(
             f"its coordinates reach from ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, "
             f"{high[1]:.1f}) and the pattern has {size[0]} x {size[1]} pixels",
@@ -114,26 +114,26 @@ def prepare(
     """Return what stays the same over all iterations, and the smoothed start (H, W, 2)."""
     view = view_of(image, start.valid, options.gamma)
     q = padded(start.q.astype(np.float32), np.nan)
-    known = np.asarray(np.isfinite(q).all(-1))
+    valid = np.asarray(np.isfinite(q).all(-1))
     links = find_links(q)
     windows = Windows(links, options.window)
-    weight = known.astype(np.float32)
+    weight = valid.astype(np.float32)
     wide = Smoother(Windows(links, WIDER * options.window), links, weight)
-    smooth = smoothed_start(np.where(known[..., None], q, 0), weight, links, windows, wide)
-    usable = (known & view.clear).astype(np.float32)
+    smooth = smoothed_start(np.where(valid[..., None], q, 0), weight, links, windows, wide)
+    usable = (valid & view.clear).astype(np.float32)
     return Comparison(view, usable, links, windows, wide, pattern), smooth
 
 
 def _grown(
-    frame: Comparison, found: Refined, covariance: Image, verdict: Verdict, options: RefineOptions
+    frame: Comparison, refined: Refined, covariance: Image, verdict: Verdict, options: RefineOptions
 ) -> Grown:
     none = np.zeros_like(verdict.good)
-    grown = Grown(without_pull(frame, found), covariance, verdict.good, none)
+    grown = Grown(without_pull(frame, refined), covariance, verdict.good, none)
     # What the start has and the image does not confirm keeps the start's coordinate.
     barred = any_in(frame.usable > 0)
     for _ in range(options.rounds):
         before = int(grown.added.sum())
-        grown = grow(frame, grown, options, found.blur, barred)
+        grown = grow(frame, grown, options, refined.blur, barred)
         if int(grown.added.sum()) == before:
             break
     return grown
@@ -145,14 +145,14 @@ def _merged(
 ) -> RefinedMap:  # fmt: skip
     """Put together what was refined, what stays the start's, and what was added."""
     height, width = start.q.shape[:2]
-    known, added = start.valid, repeated(grown.added)[:height, :width] & ~start.valid
-    good = repeated(grown.good)[:height, :width] & known
-    beaten = repeated(verdict.beaten)[:height, :width] & known & ~good
-    seen = good | added
-    q = np.where(seen[..., None], grown.q[:height, :width], start.q)
+    valid, added = start.valid, repeated(grown.added)[:height, :width] & ~start.valid
+    good = repeated(grown.good)[:height, :width] & valid
+    beaten = repeated(verdict.beaten)[:height, :width] & valid & ~good
+    confirmed = good | added
+    q = np.where(confirmed[..., None], grown.q[:height, :width], start.q)
     q[beaten] = np.nan
     covariance = blend(grown.covariance, links)[:height, :width]
-    covariance = np.where(seen[..., None], covariance, _of_start(start, q, good))
+    covariance = np.where(confirmed[..., None], covariance, _of_start(start, q, good))
     covariance[~np.isfinite(q[..., 0])] = np.nan
     map_ = CorrespondenceMap(
         q.astype(np.float32), start.name, relative_weight(covariance),

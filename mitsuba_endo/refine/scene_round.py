@@ -128,15 +128,17 @@ def _added(
 ) -> tuple[_Cells, float]:  # fmt: skip
     """Refine the start, and return which matches hold, and the pattern's blur."""
     frame, q = prepare(start, image, pattern, options)
-    found = iterate(frame, q, options)
-    covariance = cell_covariance(frame, found)
-    verdict = judge(frame, found, covariance)
-    across, along = _off(found.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE], matched)
+    refined = iterate(frame, q, options)
+    covariance = cell_covariance(frame, refined)
+    verdict = judge(frame, refined, covariance)
+    across, along = _off(refined.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE], matched)
     added = ~kept & (matched.margin > SURE) & verdict.good
     added &= (across < MOVED_ACROSS) & (along < MOVED_ALONG)
     large = _large(kept | added, frame.links)
-    cells = _Cells(kept & large, added & large, without_pull(frame, found), covariance, frame.links)
-    return cells, found.blur
+    cells = _Cells(
+        kept & large, added & large, without_pull(frame, refined), covariance, frame.links
+    )
+    return cells, refined.blur
 
 
 def _large(there: NDArray[np.bool_], links: Links) -> NDArray[np.bool_]:

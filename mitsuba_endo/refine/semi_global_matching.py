@@ -34,10 +34,10 @@ def aggregated(cost: Volume, neighbour: float, jump: float) -> Volume:
 
 def _directions(cost: Volume, out: Volume) -> Iterator[tuple[Volume, Volume, int]]:
     """Yield views of costs and sums, lines first, and a path's shift from line to line."""
-    for way in (1, -1):
+    for direction in (1, -1):
         for shift in (-1, 0, 1):
-            yield cost[::way], out[::way], shift
-        yield cost.swapaxes(0, 1)[::way], out.swapaxes(0, 1)[::way], 0
+            yield cost[::direction], out[::direction], shift
+        yield cost.swapaxes(0, 1)[::direction], out.swapaxes(0, 1)[::direction], 0
 
 
 def _shifted(line: Volume, shift: int) -> Volume:

@@ -13,20 +13,20 @@ LEAST = 1e-3
 class Smoother:
     """Fits value and slope around every cell to what is known under its window."""
 
-    def __init__(self, windows: Windows, links: Links, known: Image) -> None:
+    def __init__(self, windows: Windows, links: Links, weight: Image) -> None:
         """Prepare the fit.
 
         Args:
             windows: around the cells.
             links: of the same cells.
-            known: (h SIDE, w SIDE) weight of each pixel, 0 = missing.
+            weight: (h SIDE, w SIDE) weight of each pixel, 0 = missing.
         """
-        self._windows, self._links, self._known = windows, links, known
-        self._x, self._y = _inside_cells(known.shape)
+        self._windows, self._links, self._weight = windows, links, weight
+        self._x, self._y = _inside_cells(weight.shape)
         x, y = self._x, self._y
-        inner = [known * x, known * y, known * x * x, known * x * y, known * y * y]
+        inner = [weight * x, weight * y, weight * x * x, weight * x * y, weight * y * y]
         fields = [mean(f) for f in inner]
-        self._sums = [*fields[:2], mean(known)]
+        self._sums = [*fields[:2], mean(weight)]
         m = windows.moments(fields[2:], fields[:2], self._sums[2:])
         self.support = m.of(2, 0)
         """(h w,) sum of the weights under each window, in cells."""
@@ -53,7 +53,7 @@ class Smoother:
         Args:
             field: (h SIDE, w SIDE); what lies where nothing is known does not matter if finite.
         """
-        weighted = self._known * field
+        weighted = self._weight * field
         inner = [mean(weighted * self._x), mean(weighted * self._y)]
         m = self._windows.moments(inner, [mean(weighted)])
         return self._solve(m)

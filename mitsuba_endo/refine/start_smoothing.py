@@ -36,9 +36,9 @@ def smoothed_start(
     return blend(mixed, links, wide_slope + share[..., None] * (slope - wide_slope))
 
 
-def _share(apart: Image, known: Image, windows: Windows) -> Image:
+def _share(apart: Image, weight: Image, windows: Windows) -> Image:
     """Return the narrow windows' share (h, w), 0 to 1, from how both differ around each cell."""
     squared = np.square(apart).sum(-1)
-    m = windows.moments([known * squared, known])
+    m = windows.moments([weight * squared, weight])
     around = (m.of(0, 0) / np.maximum(m.of(0, 1), 1e-6)).reshape(windows.shape)
     return np.square(around / (around + BEND**2)).astype(np.float32)

@@ -136,8 +136,8 @@ def _cut(
     torn = np.pad(~link, ((0, 0), (1, 1)))
     before = np.cumsum(torn, 1, dtype=np.int32)
     # before[:, i]: tears left of cell i; those within reach are the difference.
-    place = np.arange(n)
-    low, high = np.maximum(place - reach, 0), np.minimum(place + reach, n - 1)
+    index = np.arange(n)
+    low, high = np.maximum(index - reach, 0), np.minimum(index + reach, n - 1)
     line, cell = np.nonzero(before[:, high] != before[:, low])
     there = cell[:, None] + np.arange(-reach, reach + 1)
     inside = (there >= 0) & (there < n)
