@@ -25,34 +25,34 @@ class BlockIndex:
     def __len__(self) -> int:
         return len(self.places)
 
-    def find(self, places: Index) -> Index:
+    def find(self, blocks: Index) -> Index:
         """Return the slots of blocks (..., 3), -1 for those that are not there."""
         if not len(self):
-            return np.full(places.shape[:-1], -1)
-        wanted = keys_of(places)
+            return np.full(blocks.shape[:-1], -1)
+        wanted = keys_of(blocks)
         at = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
         return np.where(self._keys[at] == wanted, self._slots[at], -1)
 
-    def add(self, places: Index) -> Index:
+    def add(self, blocks: Index) -> Index:
         """Return the slots of distinct blocks (M, 3), adding those that are not there."""
-        missing = places[self.find(places) < 0]
+        missing = blocks[self.find(blocks) < 0]
         keys = np.concatenate([self._keys, keys_of(missing)])
         slots = np.concatenate([self._slots, len(self) + np.arange(len(missing))])
         order = np.argsort(keys, kind="stable")
         self._keys, self._slots = keys[order], slots[order]
         self.places = np.concatenate([self.places, missing])
-        return self.find(places)
+        return self.find(blocks)
 
 
-def keys_of(places: Index) -> Index:
+def keys_of(coordinates: Index) -> Index:
     """Pack integer coordinates (..., 3) into one number each.
 
     Raises:
         ValueError: a coordinate is more than a million from the origin.
     """
-    if places.size and np.abs(places).max() >= _HALF_SPAN:
+    if coordinates.size and np.abs(coordinates).max() >= _HALF_SPAN:
         raise ValueError("the surface is too large for its voxels; choose larger voxels")
-    x, y, z = np.moveaxis(places + _HALF_SPAN, -1, 0)
+    x, y, z = np.moveaxis(coordinates + _HALF_SPAN, -1, 0)
     return (x << 42) | (y << 21) | z
 
 

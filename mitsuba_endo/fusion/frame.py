@@ -34,12 +34,12 @@ class RangeFrame:
             raise ValueError(f"the weight is {self.weight.shape}, the range image {shape}")
 
     @cached_property
-    def seen(self) -> NDArray[np.bool_]:
+    def valid(self) -> NDArray[np.bool_]:
         """(H, W) pixels that count: a range above zero and a weight above zero."""
-        seen = np.isfinite(self.range) & (np.nan_to_num(self.range) > 0)
+        valid = np.isfinite(self.range) & (np.nan_to_num(self.range) > 0)
         if self.weight is not None:
-            seen &= np.nan_to_num(self.weight) > 0
-        return seen
+            valid &= np.nan_to_num(self.weight) > 0
+        return valid
 
     @cached_property
     def inverse_range(self) -> Floats:
@@ -47,7 +47,7 @@ class RangeFrame:
 
         Single pixels that are missing or wild are interpolated where their neighbours agree.
         """
-        return mended(1 / np.where(self.seen, self.range, np.nan), self.camera.grid_rays)
+        return mended(1 / np.where(self.valid, self.range, np.nan), self.camera.grid_rays)
 
     @cached_property
     def spacing(self) -> Floats:
@@ -59,7 +59,7 @@ class RangeFrame:
     @property
     def footprint(self) -> float:
         """Median size of a pixel on a surface that faces the camera, the unit of the ranges."""
-        return float(np.median((self.range * self.spacing)[self.seen]))
+        return float(np.median((self.range * self.spacing)[self.valid]))
 
     @cached_property
     def cells(self) -> "Cells":
@@ -86,7 +86,7 @@ class Cells:
         cosine = _cosines(frame.camera.grid_rays, 1 / inverse, smooth)
         cone = np.cos(3 * frame.spacing[:-1, :-1])
         weight = inverse**4 if frame.weight is None else frame.weight
-        weight = _corner_mean(np.where(frame.seen, weight, 0.0))
+        weight = _corner_mean(np.where(frame.valid, weight, 0.0))
         return cls(smooth, cosine, np.where(smooth, weight, 0.0), cone)
 
 

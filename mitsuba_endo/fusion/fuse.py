@@ -43,7 +43,7 @@ class FusedMesh:
 
 def voxel_size(frames: Sequence[RangeFrame]) -> float:
     """Return the frames' median size of a pixel on the surface: what they can resolve."""
-    footprints = [frame.footprint for frame in frames if frame.seen.any()]
+    footprints = [frame.footprint for frame in frames if frame.valid.any()]
     if not footprints:
         raise ValueError("no frame has seen anything, so there is nothing to fuse")
     return float(np.median(footprints))

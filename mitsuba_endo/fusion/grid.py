@@ -77,8 +77,8 @@ def close_pinches(grid: Grid) -> None:
     joins the sheets, as :mod:`mitsuba_endo.shapes.surface_nets` does it.
     """
     for _ in range(_ROUNDS):
-        found = [_pinched(grid, slots, axis) for slots in grid.chunks() for axis in range(3)]
-        block, *voxel = np.concatenate([np.empty((0, 4), np.int64), *found]).T
+        pinched = [_pinched(grid, slots, axis) for slots in grid.chunks() for axis in range(3)]
+        block, *voxel = np.concatenate([np.empty((0, 4), np.int64), *pinched]).T
         if not len(block):
             return
         value = grid.distance[block, *voxel]
@@ -100,5 +100,5 @@ def _pinched(grid: Grid, slots: Index, axis: int) -> Index:
     values = corners[:, block, *cell]
     nearest = np.where(values >= 0, values, np.inf).argmin(0)
     at = np.stack(cell, -1) + ring[nearest]
-    places = grid.index.places[slots[block]] + at // SIDE
-    return np.column_stack([grid.index.find(places), at % SIDE])
+    blocks = grid.index.places[slots[block]] + at // SIDE
+    return np.column_stack([grid.index.find(blocks), at % SIDE])

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 class Interpolated:
     """What a volume holds at points of the world."""
 
-    known: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     """(N,) whether all eight voxels around the point were seen."""
     distance: Floats
     """(N,) to the surface, positive on the cameras' side, the unit of the voxels' side; else 0."""
@@ -34,8 +34,8 @@ def interpolate(volume: Volume, points: Floats) -> Interpolated:
     at = points / volume.voxel
     cell = np.floor(at).astype(np.int64)
     value = _corner_values(volume, cell)
-    known = np.asarray(np.isfinite(value).all(0))
-    value = np.where(known, value, 0.0)
+    observed = np.asarray(np.isfinite(value).all(0))
+    value = np.where(observed, value, 0.0)
     share = (at - cell).T
     # Halves the corners axis by axis: x is the slowest in CORNERS, z the fastest.
     along_x = value[4:] - value[:4]
@@ -46,7 +46,9 @@ def interpolate(volume: Volume, points: Floats) -> Interpolated:
     slope_y = _linear(along_y, share[2])[0]
     slope_z = line[1] - line[0]
     distance = line[0] + share[2] * slope_z
-    return Interpolated(known, volume.voxel * distance, np.stack([slope_x, slope_y, slope_z], -1))
+    return Interpolated(
+        observed, volume.voxel * distance, np.stack([slope_x, slope_y, slope_z], -1)
+    )
 
 
 def _linear(values: Floats, share: Floats) -> Floats:
@@ -60,9 +62,9 @@ def _corner_values(volume: Volume, cell: NDArray[np.int64]) -> Floats:
     out = np.full((len(CORNERS), len(cell)), np.nan)
     for value, corner in zip(out, CORNERS, strict=True):
         voxel = cell + corner
-        place = voxel // SIDE
-        slot = volume.index.find(place)
+        block = voxel // SIDE
+        slot = volume.index.find(block)
         there = slot >= 0
-        x, y, z = (voxel - SIDE * place)[there].T
+        x, y, z = (voxel - SIDE * block)[there].T
         value[there] = volume.distance(slot[there], (x * SIDE + y) * SIDE + z)
     return out

@@ -31,14 +31,14 @@ def remesh(vertices: Floats, faces: Index, edge: Floats) -> tuple[Floats, Index]
         faces: (F, 3) of it; what hangs together with no centre is lost.
         edge: (V,) length that edges shall have about each vertex, above zero.
     """
-    ways = _ways(vertices, faces, edge)
+    lengths = _edge_lengths(vertices, faces, edge)
     # Cells of equal weight under this density have sides proportional to the edge.
     weight = np.bincount(faces.ravel(), areas(vertices, faces).repeat(3), len(vertices)) / edge**4
     border = _border(faces, len(vertices))
     centres = _spread(vertices, _APART * edge, border)
     for _ in range(_ROUNDS):
-        centres = _middles(vertices, weight, _cells(ways, centres), border)
-    cell = _cells(ways, centres)[faces]
+        centres = _middles(vertices, weight, _cells(lengths, centres), border)
+    cell = _cells(lengths, centres)[faces]
     corners = cell[(cell >= 0).all(1) & (cell != np.roll(cell, 1, axis=1)).all(1)]
     triangles, kept = clean(vertices[centres], corners)
     triangles, used = compact(triangles[~_ears(triangles)])
@@ -59,7 +59,7 @@ def _ears(faces: Index) -> NDArray[np.bool_]:
     return (count[number] == 1).sum(1) >= 2
 
 
-def _ways(vertices: Floats, faces: Index, edge: Floats) -> sp.csr_array:
+def _edge_lengths(vertices: Floats, faces: Index, edge: Floats) -> sp.csr_array:
     """Return the lengths (V, V) of the ways to neighbours, in edges."""
     a, b = neighbours(faces, len(vertices))
     lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1) / ((edge[a] + edge[b]) / 2)
@@ -90,9 +90,9 @@ def _spread(vertices: Floats, free: Floats, first: NDArray[np.bool_]) -> Index:
     return np.array(chosen, np.int64)
 
 
-def _cells(ways: sp.csr_array, centres: Index) -> Index:
+def _cells(lengths: sp.csr_array, centres: Index) -> Index:
     """Return to which centre (V,) the way is shortest, -1 where none leads."""
-    _, _, nearest = dijkstra(ways, indices=centres, min_only=True, return_predecessors=True)
+    _, _, nearest = dijkstra(lengths, indices=centres, min_only=True, return_predecessors=True)
     number = np.full(len(nearest), -1)
     number[centres] = np.arange(len(centres))
     return np.where(nearest >= 0, number[np.maximum(nearest, 0)], -1)

@@ -80,13 +80,13 @@ def _vertices(volume: Volume, grid: Grid, slots: Index, cell: Index) -> tuple[ND
     The mean of the points where the surface crosses the cell's edges, then one Newton step to
     the zero of the trilinear interpolation, along its gradient.
     """
-    place, *xyz = _corner_voxels(volume.index, slots, cell)
+    corner_slots, *xyz = _corner_voxels(volume.index, slots, cell)
     within = np.ravel_multi_index(xyz, (SIDE,) * 3)
-    value = grid.distance[place, *xyz].astype(float)
+    value = grid.distance[corner_slots, *xyz].astype(float)
     at = _newton(value, _crossing_mean(value))
     vertices = (volume.index.places[slots] * SIDE + cell + at) * volume.voxel
-    counted = volume.frames(place, within).max(1)
-    weight, scatter = volume.weight(place, within), volume.scatter(place, within)
+    counted = volume.frames(corner_slots, within).max(1)
+    weight, scatter = volume.weight(corner_slots, within), volume.scatter(corner_slots, within)
     return vertices, counted, weight.mean(1), scatter.mean(1) * volume.voxel**2
 
 
@@ -94,8 +94,8 @@ def _corner_voxels(index: BlockIndex, slots: Index, cell: Index) -> tuple[Index,
     """Return the slots and the places x, y, z in the block (N, 8) of the corners of cells."""
     corner = cell[:, None] + CORNERS
     beyond = corner // SIDE
-    place = index.find(index.places[slots][:, None] + beyond)
-    return place, *np.moveaxis(corner - beyond * SIDE, -1, 0)
+    corner_slots = index.find(index.places[slots][:, None] + beyond)
+    return corner_slots, *np.moveaxis(corner - beyond * SIDE, -1, 0)
 
 
 def _crossing_mean(value: Floats) -> Floats:
@@ -127,11 +127,11 @@ def _slope(value: Floats, shares: Floats, axis: int) -> Floats:
 
 def _quads(grid: Grid, numbering: NDArray[np.int32]) -> Index:
     """Return (Q, 4) vertices around every edge of the grid with a vertex in all its four cells."""
-    found = [np.empty((0, 4), np.int64)]
+    quads = [np.empty((0, 4), np.int64)]
     for slots in grid.chunks():
         distance, number = grid.with_next(slots), grid.with_previous(slots, numbering)
-        found += [_quads_along(axis, distance, number) for axis in range(3)]
-    return np.concatenate(found)
+        quads += [_quads_along(axis, distance, number) for axis in range(3)]
+    return np.concatenate(quads)
 
 
 def _quads_along(axis: int, distance: NDArray[np.float32], number: NDArray[np.int32]) -> Index:

@@ -51,8 +51,8 @@ class Volume:
 
     def integrate(self, frame: RangeFrame) -> None:
         """Add what one frame saw."""
-        places = blocks_near(_samples(frame, self.voxel * SIDE / 2), self.voxel * SIDE)
-        slots = self.index.add(places)
+        blocks = blocks_near(_samples(frame, self.voxel * SIDE / 2), self.voxel * SIDE)
+        slots = self.index.add(blocks)
         self._reserve(len(self.index))
         for start in range(0, len(slots), CHUNK):
             self._add(frame, slots[start : start + CHUNK])
@@ -70,8 +70,8 @@ class Volume:
                 in them, for these alone.
         """
         weight, first = self._sums[*at, ..., 0], self._sums[*at, ..., 1]
-        seen = weight > 0
-        return np.where(seen, first / np.where(seen, weight, 1), np.float32(np.nan))
+        observed = weight > 0
+        return np.where(observed, first / np.where(observed, weight, 1), np.float32(np.nan))
 
     def weight(self, *at: Index) -> NDArray[np.float32]:
         """Return sums of weights, as :meth:`distance`."""
@@ -94,8 +94,8 @@ class Volume:
 
     def _add(self, frame: RangeFrame, slots: Index) -> None:
         camera_from_world = frame.world_from_camera.inverse()
-        places = self.index.places[slots].astype(np.float64)
-        corners = camera_from_world.apply(places * (SIDE * self.voxel))
+        blocks = self.index.places[slots].astype(np.float64)
+        corners = camera_from_world.apply(blocks * (SIDE * self.voxel))
         within = camera_from_world.rotate(_WITHIN * self.voxel)
         at = (corners.T[:, :, None] + within.T[:, None]).reshape(3, -1)
         which, distance, weight = _measure(frame, at, self.voxel)
@@ -138,9 +138,9 @@ def _locate(frame: RangeFrame, at: Floats) -> tuple[Index, Index, Index, Floats,
     which = np.flatnonzero(inside)
     which = which[frame.cells.smooth[v[which].astype(int), u[which].astype(int)]]
     column, row = u[which].astype(np.int64), v[which].astype(np.int64)
-    ray, way = frame.camera.grid_rays[row, column], at[:, which]
-    along = np.einsum("nk,kn->n", ray, way)
-    led = along > frame.cells.cone[row, column] * np.sqrt((way**2).sum(0))
+    ray, points = frame.camera.grid_rays[row, column], at[:, which]
+    along = np.einsum("nk,kn->n", ray, points)
+    led = along > frame.cells.cone[row, column] * np.sqrt((points**2).sum(0))
     which, row, column = which[led], row[led], column[led]
     return which, row, column, u[which] - column, v[which] - row
 
@@ -169,7 +169,7 @@ def _samples(frame: RangeFrame, spacing: float) -> Floats:
 
 def _divided(corners: list[Floats], pieces: int) -> Floats:
     """Return the bilinear points (N, 3) of cells at the middles of ``pieces`` x ``pieces``."""
-    place = (np.arange(pieces) + 0.5) / pieces
-    x, y = (p.ravel()[:, None, None] for p in np.meshgrid(place, place))
+    middles = (np.arange(pieces) + 0.5) / pieces
+    x, y = (p.ravel()[:, None, None] for p in np.meshgrid(middles, middles))
     a, b, c, d = corners
     return ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)).reshape(-1, 3)

@@ -53,12 +53,12 @@ def check_plan(rig: Rig) -> None:
     Raises:
         InputError: names the field.
     """
-    share, known = rig.share, rig.scale.known_distance
+    share, distance = rig.share, rig.scale.known_distance
     rules = [
         (share.camera_pose == "per_frame", "share.camera_pose", "a sequence's camera moves"),
         (share.surface == "shared", "share.surface", "a sequence has one surface"),
         (share.focal != "per_frame", "share.focal", "a sequence has one focal length"),
-        (known is None or known.frame == 0, "scale.known_distance.frame",
+        (distance is None or distance.frame == 0, "scale.known_distance.frame",
          "the unit of length comes from the first frame"),
     ]  # fmt: skip
     rules += [
@@ -89,21 +89,23 @@ def begin(
     Raises:
         InputError: none of the frames tells focal length and pose; says what to do.
     """
-    first, found = _calibrated(maps, rig)
-    projector, pose = _calibration_of(found)
+    first, calibration = _calibrated(maps, rig)
+    projector, pose = _calibration_of(calibration)
     free = rig.projector.focal.refine and rig.share.focal != "fixed"
     agreed = focal_of(views[first:], projector, pose, free=free)
     if rig.share.projector_pose != "per_frame":
         agreed = replace(agreed, poses=[pose])
     view, projector, pose = views[first], agreed.projector, agreed.poses[0]
-    seen = triangulate(view.sample(projector), projector, pose)
-    voxel = options.voxel or _voxel(view, seen.range[seen.good])
+    triangulated = triangulate(view.sample(projector), projector, pose)
+    voxel = options.voxel or _voxel(view, triangulated.range[triangulated.good])
     setup = Setup(
         view.camera, thinning(rig.camera.to_model()), projector,
         ProjectorDrift.of(rig, float(np.linalg.norm(pose.t))), voxel, options.fuse_every,
         options.seed,
     )  # fmt: skip
-    return Beginning(setup, first, pose, noise_of(seen, 1.0), found.solution, agreed.told)
+    return Beginning(
+        setup, first, pose, noise_of(triangulated, 1.0), calibration.solution, agreed.told
+    )
 
 
 def _calibrated(maps: Sequence[CorrespondenceMap], rig: Rig) -> tuple[int, Calibration]:
@@ -111,12 +113,15 @@ def _calibrated(maps: Sequence[CorrespondenceMap], rig: Rig) -> tuple[int, Calib
     failed: InputError | None = None
     for k in np.unique(np.linspace(0, len(maps) - 1, ATTEMPTS).astype(int)).tolist():
         try:
-            found = _alone(maps[k], rig)
+            calibration = _alone(maps[k], rig)
         except InputError as error:
             failed = failed or error
             continue
-        if found.solution.projector.to_model() and found.solution.frames[0].projector_from_camera.R:
-            return k, found
+        if (
+            calibration.solution.projector.to_model()
+            and calibration.solution.frames[0].projector_from_camera.R
+        ):
+            return k, calibration
     if failed is not None:
         raise failed
     raise InputError(
@@ -130,19 +135,19 @@ def _alone(map_: CorrespondenceMap, rig: Rig) -> Calibration:
     full = rig.camera.to_model()
     step = thinning(full)
     camera = Camera.from_model(thinned(full, step))
-    known = rig.scale.known_distance
-    if known is not None and step > 1:
-        pixels = [[c / step for c in pixel] for pixel in known.pixels]
-        known = known.model_copy(update={"pixels": pixels})
-    scale = rig.scale.model_copy(update={"known_distance": known})
+    distance = rig.scale.known_distance
+    if distance is not None and step > 1:
+        pixels = [[c / step for c in pixel] for pixel in distance.pixels]
+        distance = distance.model_copy(update={"pixels": pixels})
+    scale = rig.scale.model_copy(update={"known_distance": distance})
     own = rig.model_copy(update={"camera": camera, "scale": scale, "drift": None})
     small = CorrespondenceMap(map_.q[::step, ::step], map_.name)
     return calibrate([small], own, Options(jackknife=False, check_model=False))
 
 
-def _calibration_of(found: Calibration) -> tuple[ProjectorModel, RigidTransform]:
-    model = found.solution.projector.to_model()
-    pose = found.solution.frames[0].projector_from_camera.to_transform()
+def _calibration_of(calibration: Calibration) -> tuple[ProjectorModel, RigidTransform]:
+    model = calibration.solution.projector.to_model()
+    pose = calibration.solution.frames[0].projector_from_camera.to_transform()
     assert model is not None
     assert pose is not None
     return model, pose

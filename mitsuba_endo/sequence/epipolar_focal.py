@@ -100,9 +100,11 @@ def focal_of(
     return Calibrated(projector, poses, told)
 
 
-def told_of_focal(found: Triangulated, pose: RigidTransform, noise: float) -> tuple[float, float]:
+def told_of_focal(
+    triangulated: Triangulated, pose: RigidTransform, noise: float
+) -> tuple[float, float]:
     """Return the information and the pull of one frame on the log of the focal length."""
-    return _linear(found, pose, noise).focal
+    return _linear(triangulated, pose, noise).focal
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,15 +144,15 @@ def _on_lines(view: ThinnedMap, projector: ProjectorModel, pose: RigidTransform)
 
 
 def _equations(view: ThinnedMap, projector: ProjectorModel, pose: RigidTransform) -> _Equations:
-    found = triangulate(view.sample(projector, SAMPLES), projector, pose)
-    return _linear(found, pose, noise_of(found, 1.0))
+    triangulated = triangulate(view.sample(projector, SAMPLES), projector, pose)
+    return _linear(triangulated, pose, noise_of(triangulated, 1.0))
 
 
-def _linear(found: Triangulated, pose: RigidTransform, noise: float) -> _Equations:
+def _linear(triangulated: Triangulated, pose: RigidTransform, noise: float) -> _Equations:
     basis = pose_directions(pose)
-    r = found.across / noise
-    weight = np.where(found.good, geman_mcclure_weight(r / FAR), 0.0)
-    J = np.concatenate([basis.T @ found.by_pose[:6], found.by_pose[6:]]) / noise
+    r = triangulated.across / noise
+    weight = np.where(triangulated.good, geman_mcclure_weight(r / FAR), 0.0)
+    J = np.concatenate([basis.T @ triangulated.by_pose[:6], triangulated.by_pose[6:]]) / noise
     A = (J * weight) @ J.T
     A[np.arange(5), np.arange(5)] += 1e-9 * np.trace(A[:5, :5]) / 5
     return _Equations(A, J @ (weight * r), basis)

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 def camera_by_projector(
     sample: PixelSample,
-    found: Triangulated,
+    triangulated: Triangulated,
     poses: Poses,
     before: RigidTransform,
     projector: ProjectorModel,
@@ -31,22 +31,24 @@ def camera_by_projector(
 
     Args:
         sample: of a frame.
-        found: its points.
+        triangulated: its points.
         poses: where it is.
         before: world_from_camera of an earlier frame.
         projector: with its focal length.
         volume: the map, which gives the normals.
     """
-    seen = against_map(sample, found, poses.world_from_camera, volume)
-    rays = seen.by_poses[6:]  # w . (X x n) + dt . n
-    here = seen.cosine * found.range_by_pose
-    points = sample.rays * found.range
+    residuals = against_map(sample, triangulated, poses.world_from_camera, volume)
+    rays = residuals.by_poses[6:]  # w . (X x n) + dt . n
+    here = residuals.cosine * triangulated.range_by_pose
+    points = sample.rays * triangulated.range
     motion = before.inverse() @ poses.world_from_camera
     earlier = motion.R @ points + motion.t[:, None]
     normal = motion.R @ rays[3:]
     cosine = dot(normal, earlier) / np.sqrt(dot(earlier, earlier))
     there = cosine * range_response(projector, poses.projector_from_camera, earlier)
-    A = (rays * seen.known) @ rays.T
+    A = (rays * residuals.observed) @ rays.T
     A[np.arange(6), np.arange(6)] += 1e-9 * np.trace(A)
-    step: Floats = np.linalg.solve(A, (rays * seen.known) @ (there - here).T).astype(np.float64)
+    step: Floats = np.linalg.solve(A, (rays * residuals.observed) @ (there - here).T).astype(
+        np.float64
+    )
     return step

@@ -35,16 +35,16 @@ def finish(recorded: Recorded) -> Finished:
     if beginning is None:
         raise ValueError("nothing was recorded before the first frames were calibrated")
     plan, projector = _plan(recorded.rig, beginning), beginning.setup.projector
-    found: dict[int, FinishedPart | None] = {}
+    finished: dict[int, FinishedPart | None] = {}
     with threadpool_limits(1, "blas"):
         joined, rows = join(recorded)
         main = int(np.bincount([row.part for row in rows if not row.lost]).argmax())
         for number in sorted(range(len(joined)), key=lambda k: k != main):
             held = plan if number == main else replace(plan, focal_free=False)
-            found[number] = _adjusted(joined[number], projector, held)
-            first = found[main]
+            finished[number] = _adjusted(joined[number], projector, held)
+            first = finished[main]
             projector = projector if first is None else first.adjusted.projector
-    parts = [found[k] for k in range(len(joined))]
+    parts = [finished[k] for k in range(len(joined))]
     return Finished([_row(row, parts) for row in rows], joined, parts, main, projector)
 
 
@@ -61,12 +61,12 @@ def _adjusted(part: Joined, projector: ProjectorModel, plan: Plan) -> FinishedPa
 
 def _row(row: FrameRow, parts: list[FinishedPart | None]) -> FrameRow:
     part = None if row.lost else parts[row.part]
-    found: FinishedPose | None = None if part is None else part.poses.get(row.number)
-    if found is None:
+    finished: FinishedPose | None = None if part is None else part.poses.get(row.number)
+    if finished is None:
         return row
-    std = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    std = np.sqrt(np.maximum(np.diag(finished.covariance), 0.0))
     return replace(
-        row, world_from_camera=found.poses.world_from_camera,
-        projector_from_camera=found.poses.projector_from_camera, projector_std=std[:6],
-        camera_std=std[6:] if std[6:].any() else None, noise_px=found.noise,
+        row, world_from_camera=finished.poses.world_from_camera,
+        projector_from_camera=finished.poses.projector_from_camera, projector_std=std[:6],
+        camera_std=std[6:] if std[6:].any() else None, noise_px=finished.noise,
     )  # fmt: skip

@@ -17,13 +17,13 @@ LEAST_ON_LINES = 0.7
 """Share of the correspondences near their epipolar lines."""
 
 
-def fault(found: Placement) -> str:
+def fault(placement: Placement) -> str:
     """Return why a placement cannot be trusted, in words; empty if it can."""
-    if found.on_lines < LEAST_ON_LINES:
+    if placement.on_lines < LEAST_ON_LINES:
         return "its correspondences fit no pose of the projector"
-    if found.overlap < LEAST_OVERLAP:
-        return f"only {100 * found.overlap:.0f} % of it overlaps what was seen before"
-    poor = found.agreement < LEAST_AGREEMENT or found.misfit > LARGEST_MISFIT
-    if poor or not found.settled:
+    if placement.overlap < LEAST_OVERLAP:
+        return f"only {100 * placement.overlap:.0f} % of it overlaps what was seen before"
+    poor = placement.agreement < LEAST_AGREEMENT or placement.misfit > LARGEST_MISFIT
+    if poor or not placement.settled:
         return "it fits nowhere on what was seen before"
     return ""

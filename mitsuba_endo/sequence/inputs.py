@@ -59,17 +59,17 @@ class Feed:
         Raises:
             InputError: the first ones are not those that were seen before.
         """
-        seen = 0
+        checked = 0
         for arrival in self._arriving:
-            if seen < len(self.past):
-                self._check(seen, arrival)
-                seen += 1
+            if checked < len(self.past):
+                self._check(checked, arrival)
+                checked += 1
             else:
                 self.marks.append(arrival.mark)
                 yield arrival.frame()
-        if seen < len(self.past):
+        if checked < len(self.past):
             raise InputError(
-                f"the sequence to go on with has {len(self.past)} frames, and {seen} are given",
+                f"the sequence to go on with has {len(self.past)} frames, and {checked} are given",
                 self.where, "give all of them again, and new ones after them",
             )  # fmt: skip
 
@@ -124,7 +124,7 @@ def frames_of(
             maps with images, a mask of another size, no frame is left, or the earlier run read
             otherwise.
     """
-    files = frame_files([_known(path) for path in paths])
+    files = frame_files([_recognised(path) for path in paths])
     maps = [file for file in files if is_map(file)]
     if maps and len(maps) < len(files):
         raise InputError("maps and images are given", str(maps[0]), "give one kind")
@@ -161,7 +161,7 @@ def feed_of_maps(
     return Feed(arriving(), len(maps) if isinstance(maps, Sequence) else None, marks, where)
 
 
-def _known(path: Path) -> Path:
+def _recognised(path: Path) -> Path:
     """Refuse what is neither a map nor images, by its name."""
     if not is_images(path) and not is_map(path):
         raise InputError(
@@ -209,8 +209,8 @@ def _read(decoder: ImageDecoder, image: ImageFrame, reading: FrameReading) -> In
     decoded = decoder.decode(image)
     if decoded.grid.reason:
         return Unread(image.name, decoded.grid.reason)
-    found = decoded.map.map
-    values = {field.name: getattr(found, field.name) for field in fields(found)}
+    map_ = decoded.map.map
+    values = {field.name: getattr(map_, field.name) for field in fields(map_)}
     return _masked(PicturedMap(**values, picture=_picture(image)), reading)
 
 

@@ -70,12 +70,12 @@ def join(recorded: Recorded) -> tuple[list[Joined], list[FrameRow]]:
     rows = recorded.rows
     for number, part in enumerate(recorded.parts):
         maps = list(recorded.kept[number].kept)
-        found = _meeting(part, wholes)
-        if found is None:
+        meeting = _meeting(part, wholes)
+        if meeting is None:
             wholes.append(Joined(part.setup, part.views, part.volume, part.keyframes, maps))
             into, move = len(wholes) - 1, None
         else:
-            into, move = found
+            into, move = meeting
             _add(wholes[into], part, move)
             wholes[into].maps += maps
         rows = [_row(row, number, into, move) for row in rows]
@@ -135,8 +135,8 @@ def _registered(
     pair = register_pair(other.pyramid, source, rng)
     if pair.fit.fault:
         return None
-    found = pair.target_from_source
-    there = RigidTransform(found.R[0], other.pyramid.unit * found.t[0])
+    target_from_source = pair.target_from_source
+    there = RigidTransform(target_from_source.R[0], other.pyramid.unit * target_from_source.t[0])
     return other.poses.world_from_camera @ there
 
 
@@ -150,10 +150,10 @@ def _placed(part: Part, whole: Joined, keyframe: Keyframe, camera: RigidTransfor
     if view is None:
         return None
     start = Poses(orthonormal(camera), keyframe.poses.projector_from_camera)
-    found = _place(view, start, whole)
-    if fault(found):
+    placement = _place(view, start, whole)
+    if fault(placement):
         return None
-    own, there = keyframe.poses, found.poses
+    own, there = keyframe.poses, placement.poses
     scale = np.linalg.norm(there.projector_from_camera.t) / np.linalg.norm(
         own.projector_from_camera.t
     )
@@ -168,10 +168,10 @@ def _confirmed(part: Part, whole: Joined, number: int, move: Move) -> bool:
         return False
     view = min(others, key=lambda v: abs(v.number - number))
     said = move.of(view.poses)
-    found = _place(view, said, whole)
-    off = said.world_from_camera.inverse() @ found.poses.world_from_camera
+    placement = _place(view, said, whole)
+    off = said.world_from_camera.inverse() @ placement.poses.world_from_camera
     far = np.linalg.norm(off.t) > NEAR_SHIFT * whole.keyframes.kept[0].pyramid.unit
-    return not (fault(found) or far or rotation_angle(off.R) > NEAR_TURN)
+    return not (fault(placement) or far or rotation_angle(off.R) > NEAR_TURN)
 
 
 def _views(part: Part) -> list[KeptView]:
@@ -193,8 +193,8 @@ def _add(whole: Joined, part: Part, move: Move) -> None:
             moved = replace(view, poses=move.of(view.poses))
             whole.views.take(moved, fused=fused)
             if fused:
-                seen = ranged(moved.view, moved.poses, whole.setup.projector, moved.noise)
-                whole.volume.integrate(seen.frame)
+                ranges = ranged(moved.view, moved.poses, whole.setup.projector, moved.noise)
+                whole.volume.integrate(ranges.frame)
     moved_keyframes = [_keyframe(kept, move) for kept in part.keyframes.kept]
     whole.keyframes.kept = [*whole.keyframes.kept, *moved_keyframes]
 

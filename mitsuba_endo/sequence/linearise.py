@@ -142,7 +142,7 @@ def _projection(projector: ProjectorModel, Y: Floats) -> tuple[Floats, Floats]:
 class AgainstMap:
     """Distances of triangulated points to the map."""
 
-    known: Bools
+    observed: Bools
     """(N,) where the map is known."""
     distance: Floats
     """(N,) signed, along the map's normal."""
@@ -153,20 +153,20 @@ class AgainstMap:
 
 
 def against_map(
-    sample: PixelSample, found: Triangulated, camera: RigidTransform, volume: Volume
+    sample: PixelSample, triangulated: Triangulated, camera: RigidTransform, volume: Volume
 ) -> AgainstMap:
     """Compare triangulated points with the map, the camera at world_from_camera."""
-    points = sample.rays * found.range
+    points = sample.rays * triangulated.range
     at = interpolate(volume, camera.apply(points.T))
     normal = camera.R.T @ at.gradient.T
     length = np.sqrt(dot(normal, normal))
-    known = at.known & found.good & (length > _CLEAR_GRADIENT)
+    observed = at.observed & triangulated.good & (length > _CLEAR_GRADIENT)
     normal = normal / np.where(length > 0, length, 1.0)
     cosine = dot(normal, sample.rays)
     own = np.concatenate([cross(points, normal), normal])
     return AgainstMap(
-        known, at.distance / np.where(known, length, 1.0), cosine,
-        np.concatenate([cosine * found.range_by_pose, own]),
+        observed, at.distance / np.where(observed, length, 1.0), cosine,
+        np.concatenate([cosine * triangulated.range_by_pose, own]),
     )  # fmt: skip
 
 

@@ -48,9 +48,9 @@ class MapDrift:
             before = step.copy()
             before[:6], before[:, :6] = 0.0, 0.0
             before[:6, :6] = self._first
-        way = np.eye(12)
-        way[6:, :6] = to_origin[6:, 6:] @ np.kron(np.eye(2), pose.R) @ bent
-        self._covariance = way @ before @ way.T + step / (near.sum() + 1) ** 2
+        transition = np.eye(12)
+        transition[6:, :6] = to_origin[6:, 6:] @ np.kron(np.eye(2), pose.R) @ bent
+        self._covariance = transition @ before @ transition.T + step / (near.sum() + 1) ** 2
         self._places.append(pose.t)
 
     def at(self, world_from_camera: RigidTransform) -> Floats:

@@ -181,8 +181,8 @@ def _calibration(
 def _maps(observed: CorrespondenceMap, rendered: NDArray[np.float32]) -> FrameMaps:
     with np.errstate(invalid="ignore"):
         off = np.linalg.norm(observed.q - rendered, axis=-1)
-        known = off[np.isfinite(off)]
-        limit = FAR * robust_std(known) if len(known) else 0.0
+        finite = off[np.isfinite(off)]
+        limit = FAR * robust_std(finite) if len(finite) else 0.0
         return FrameMaps(observed.name, observed.q, rendered, off <= limit)
 
 

@@ -88,12 +88,14 @@ class Part:
         self._before: tuple[int, Poses] | None = None
         self._last = number, Poses(RigidTransform.identity(), projector_pose)
         self._covariance = np.zeros((6, 6))
-        self._drift = MapDrift(self._known_alone(view, Prior(projector_pose, np.zeros((6, 6)))))
+        self._drift = MapDrift(
+            self._covariance_by_lines(view, Prior(projector_pose, np.zeros((6, 6))))
+        )
         self._searches = 0
-        seen = ranged(view, self._last[1], setup.projector, noise)
+        ranges = ranged(view, self._last[1], setup.projector, noise)
         self.views = KeptViews(view.camera)
-        self._fuse(number, seen)
-        self._keep(number, self._last[1], seen)
+        self._fuse(number, ranges)
+        self._keep(number, self._last[1], ranges)
         self.views.keep(number, view, self._last[1], noise, fused=True)
         self.first = Tracked(self._last[1], np.zeros((12, 12)), None, keyframe=True)
 
@@ -108,10 +110,10 @@ class Part:
                 place(sample, start, self.setup.projector, self.volume, prior, self.noise)
                 for start in starts
             ]
-            sound = [found for found in placed if not fault(found)]
+            sound = [placement for placement in placed if not fault(placement)]
             if sound:
                 return self._accepted(
-                    number, view, sample, min(sound, key=lambda found: found.misfit)
+                    number, view, sample, min(sound, key=lambda placement: placement.misfit)
                 )
             reason = fault(placed[-1]) if placed else reason
         return reason
@@ -152,64 +154,64 @@ class Part:
         """Return a frame's range image from its own epipolar lines, and the projector's pose."""
         sample, nowhere = view.sample(self.setup.projector), Volume(self.setup.voxel)
         start = Poses(RigidTransform.identity(), prior.mean)
-        found = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
-        seen = ranged(view, found.poses, self.setup.projector, found.noise)
-        return _image(seen), found.poses.projector_from_camera
+        placement = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
+        ranges = ranged(view, placement.poses, self.setup.projector, placement.noise)
+        return _image(ranges), placement.poses.projector_from_camera
 
     def _accepted(
-        self, number: int, view: ThinnedMap, sample: PixelSample, found: Placement
+        self, number: int, view: ThinnedMap, sample: PixelSample, placement: Placement
     ) -> Tracked:
         """Take over a placement: next frames begin there, and the map may grow."""
-        setup, poses = self.setup, found.poses
-        own = in_world(self._spread.widened(found), poses.world_from_camera)
-        keyframe = self.keyframes.wanted(poses, found.overlap)
-        due = number - self._fused_at >= setup.fuse_every or found.overlap < LEAST_OVERLAP
+        setup, poses = self.setup, placement.poses
+        own = in_world(self._spread.widened(placement), poses.world_from_camera)
+        keyframe = self.keyframes.wanted(poses, placement.overlap)
+        due = number - self._fused_at >= setup.fuse_every or placement.overlap < LEAST_OVERLAP
         if keyframe or due:
-            seen = ranged(view, poses, setup.projector, found.noise)
+            ranges = ranged(view, poses, setup.projector, placement.noise)
             if keyframe:
-                self._keep(number, poses, seen)
+                self._keep(number, poses, ranges)
             self._drift.fused(
-                poses.world_from_camera, own, self._bent(sample, found),
+                poses.world_from_camera, own, self._bent(sample, placement),
                 self.keyframes.kept[0].pyramid.unit,
             )  # fmt: skip
-            self._fuse(number, seen)
-        self.views.keep(number, view, poses, found.noise, fused=keyframe or due)
+            self._fuse(number, ranges)
+        self.views.keep(number, view, poses, placement.noise, fused=keyframe or due)
         consecutive = number == self._last[0] + 1
         self._before = self._last if consecutive else None
-        self._last, self.noise, self._searches = (number, poses), found.noise, 0
+        self._last, self.noise, self._searches = (number, poses), placement.noise, 0
         self._covariance = own[:6, :6]
-        return Tracked(poses, own + self._drift.at(poses.world_from_camera), found, keyframe)
+        return Tracked(poses, own + self._drift.at(poses.world_from_camera), placement, keyframe)
 
-    def _known_alone(self, view: ThinnedMap, prior: Prior) -> Floats:
+    def _covariance_by_lines(self, view: ThinnedMap, prior: Prior) -> Floats:
         """Return the covariance (6, 6) of a projector pose that lines alone tell.
 
         The length of its translation is given.
         """
         sample, nowhere = view.sample(self.setup.projector), Volume(self.setup.voxel)
         start = Poses(RigidTransform.identity(), prior.mean)
-        found = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
-        information = np.linalg.inv(found.covariance[:6, :6])
-        scatter = information @ found.clustered[:6, :6] @ information
+        placement = place(sample, start, self.setup.projector, nowhere, prior, self.noise)
+        information = np.linalg.inv(placement.covariance[:6, :6])
+        scatter = information @ placement.clustered[:6, :6] @ information
         told = pose_directions(prior.mean)
         inverse = np.linalg.inv(told.T @ information @ told)
         return told @ inverse @ (told.T @ scatter @ told) @ inverse @ told.T
 
-    def _bent(self, sample: PixelSample, found: Placement) -> Floats:
+    def _bent(self, sample: PixelSample, placement: Placement) -> Floats:
         """Return what a wrong pose of the projector has done since the last fused frame."""
-        setup, poses = self.setup, found.poses
+        setup, poses = self.setup, placement.poses
         return camera_by_projector(
-            sample, found.found, poses, self._fused_pose, setup.projector, self.volume
+            sample, placement.triangulated, poses, self._fused_pose, setup.projector, self.volume
         )
 
-    def _fuse(self, number: int, seen: Ranged) -> None:
-        self.volume.integrate(seen.frame)
-        self._fused_at, self._fused_pose = number, seen.frame.world_from_camera
+    def _fuse(self, number: int, ranges: Ranged) -> None:
+        self.volume.integrate(ranges.frame)
+        self._fused_at, self._fused_pose = number, ranges.frame.world_from_camera
         self.fused += 1
 
-    def _keep(self, number: int, poses: Poses, seen: Ranged) -> None:
-        self.keyframes.add(number, poses, _image(seen))
+    def _keep(self, number: int, poses: Poses, ranges: Ranged) -> None:
+        self.keyframes.add(number, poses, _image(ranges))
 
 
-def _image(seen: Ranged) -> RangeImage:
-    camera = seen.frame.camera
-    return RangeImage(camera.grid_rays, seen.frame.range, camera)
+def _image(ranges: Ranged) -> RangeImage:
+    camera = ranges.frame.camera
+    return RangeImage(camera.grid_rays, ranges.frame.range, camera)

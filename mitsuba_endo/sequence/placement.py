@@ -48,7 +48,7 @@ class Placement:
     """Where a frame was put, and how well it fits there."""
 
     poses: Poses
-    found: Triangulated
+    triangulated: Triangulated
     """The sample's points, there."""
     noise: float
     """Of a coordinate, across its epipolar line, pattern pixels: robust standard deviation."""
@@ -89,66 +89,74 @@ def place(
         noise: of a coordinate, pattern pixels, as far as it is known; estimated anew.
     """
     poses, widened, settled = start, WIDEST, False
-    found = triangulate(sample, projector, poses.projector_from_camera)
+    triangulated = triangulate(sample, projector, poses.projector_from_camera)
     for _ in range(STEPS):
-        seen = against_map(sample, found, poses.world_from_camera, volume)
-        noise = noise_of(found, noise)
-        A, b = _equations(found, seen, noise, volume.voxel, widened)
+        residuals = against_map(sample, triangulated, poses.world_from_camera, volume)
+        noise = noise_of(triangulated, noise)
+        A, b = _equations(triangulated, residuals, noise, volume.voxel, widened)
         A[:6, :6] += prior.information
         b[:6] -= prior.information @ prior.pull(poses)
         step = np.linalg.solve(A, b).astype(np.float64)
         poses = poses.moved(step)
-        found = triangulate(sample, projector, poses.projector_from_camera)
-        settled = widened == 1 and _relative(step, found) < SETTLED
+        triangulated = triangulate(sample, projector, poses.projector_from_camera)
+        settled = widened == 1 and _relative(step, triangulated) < SETTLED
         if settled:
             break
         widened = max(1.0, widened / 2)
-    seen = against_map(sample, found, poses.world_from_camera, volume)
-    curvature = _curvature(found, seen, noise, volume.voxel)
+    residuals = against_map(sample, triangulated, poses.world_from_camera, volume)
+    curvature = _curvature(triangulated, residuals, noise, volume.voxel)
     curvature[:6, :6] += prior.information
     covariance = np.linalg.inv(curvature).astype(np.float64)
-    scatter = _scatter(sample.block, found, seen, noise, volume.voxel)
+    scatter = _scatter(sample.block, triangulated, residuals, noise, volume.voxel)
     clustered = covariance @ scatter @ covariance
-    return _judged(found, seen, poses, noise, volume.voxel, settled, (covariance, clustered))
+    return _judged(
+        triangulated, residuals, poses, noise, volume.voxel, settled, (covariance, clustered)
+    )
 
 
-def _relative(step: Floats, found: Triangulated) -> float:
+def _relative(step: Floats, triangulated: Triangulated) -> float:
     """Return the largest component of a step, radians or parts of the typical range."""
-    size = float(np.median(found.range[found.good])) if found.good.any() else 1.0
+    size = (
+        float(np.median(triangulated.range[triangulated.good])) if triangulated.good.any() else 1.0
+    )
     return float(np.abs(step / np.tile([1, 1, 1, size, size, size], 2)).max())
 
 
 def _judged(
-    found: Triangulated, seen: AgainstMap, poses: Poses, noise: float, voxel: float,
-    settled: bool, known: tuple[Floats, Floats],
+    triangulated: Triangulated, residuals: AgainstMap, poses: Poses, noise: float, voxel: float,
+    settled: bool, covariances: tuple[Floats, Floats],
 ) -> Placement:  # fmt: skip
-    off = np.abs(seen.distance / deviation(found, seen, noise, voxel))[seen.known]
-    near = found.good & (np.abs(found.across) < FAR * noise)
+    off = np.abs(residuals.distance / deviation(triangulated, residuals, noise, voxel))[
+        residuals.observed
+    ]
+    near = triangulated.good & (np.abs(triangulated.across) < FAR * noise)
     return Placement(
-        poses, found, noise, float(near.mean()), float(seen.known.mean()),
+        poses, triangulated, noise, float(near.mean()), float(residuals.observed.mean()),
         float((off < FAR).mean()) if len(off) else 0.0,
-        robust_std(off) if len(off) else np.inf, settled, *known,
+        robust_std(off) if len(off) else np.inf, settled, *covariances,
     )  # fmt: skip
 
 
-def noise_of(found: Triangulated, otherwise: float) -> float:
+def noise_of(triangulated: Triangulated, otherwise: float) -> float:
     """Return the robust standard deviation of the epipolar residuals, pattern pixels."""
-    if not found.good.any():
+    if not triangulated.good.any():
         return otherwise
-    return max(robust_std(found.across[found.good]), 1e-3)
+    return max(robust_std(triangulated.across[triangulated.good]), 1e-3)
 
 
-def deviation(found: Triangulated, seen: AgainstMap, noise: float, voxel: float) -> Floats:
+def deviation(
+    triangulated: Triangulated, residuals: AgainstMap, noise: float, voxel: float
+) -> Floats:
     """Return the standard deviations (N,) of distances to the map."""
-    along = np.abs(seen.cosine) * noise / found.pixels_per_length
+    along = np.abs(residuals.cosine) * noise / triangulated.pixels_per_length
     return np.hypot(along, MAP_NOISE * voxel)
 
 
 def _equations(
-    found: Triangulated, seen: AgainstMap, noise: float, voxel: float, widened: float
+    triangulated: Triangulated, residuals: AgainstMap, noise: float, voxel: float, widened: float
 ) -> tuple[Floats, Floats]:
     """Return A (12, 12) and b (12,) of a step under Geman and McClure's loss."""
-    (across, on_line, r), (along, on_map, d) = _rows(found, seen, noise, voxel, widened)
+    (across, on_line, r), (along, on_map, d) = _rows(triangulated, residuals, noise, voxel, widened)
     A, b = np.zeros((12, 12)), np.zeros(12)
     A[:6, :6] = (across * on_line) @ across.T
     b[:6] = across @ (on_line * r)
@@ -162,7 +170,9 @@ def _held(A: Floats) -> Floats:
     return A + 1e-9 * np.trace(A) * np.eye(12)
 
 
-def _curvature(found: Triangulated, seen: AgainstMap, noise: float, voxel: float) -> Floats:
+def _curvature(
+    triangulated: Triangulated, residuals: AgainstMap, noise: float, voxel: float
+) -> Floats:
     """Return the cost's second derivatives (12, 12), which say how far noise moves the minimum.
 
     The weights that make the steps overstate it. With r the residual over c = :data:`FAR`, the loss
@@ -170,11 +180,11 @@ def _curvature(found: Triangulated, seen: AgainstMap, noise: float, voxel: float
     (1 - 3 r^2) / (1 + r^2)^3,
     of which the mean over the residuals is taken.
     """
-    (across, on_line, r), (along, _, d) = _rows(found, seen, noise, voxel, 1.0)
-    known = seen.known & found.good
+    (across, on_line, r), (along, _, d) = _rows(triangulated, residuals, noise, voxel, 1.0)
+    observed = residuals.observed & triangulated.good
     A = np.zeros((12, 12))
-    A[:6, :6] = mean_curvature(r[found.good]) * (across * found.good) @ across.T
-    A += mean_curvature(d[known]) * (along * (on_line * known)) @ along.T
+    A[:6, :6] = mean_curvature(r[triangulated.good]) * (across * triangulated.good) @ across.T
+    A += mean_curvature(d[observed]) * (along * (on_line * observed)) @ along.T
     return _held(A)
 
 
@@ -187,26 +197,30 @@ def mean_curvature(residual: Floats) -> float:
 
 
 def _rows(
-    found: Triangulated, seen: AgainstMap, noise: float, voxel: float, widened: float
+    triangulated: Triangulated, residuals: AgainstMap, noise: float, voxel: float, widened: float
 ) -> tuple[tuple[Floats, Floats, Floats], tuple[Floats, Floats, Floats]]:
     """Return derivatives, weights and residuals, across the lines (6, N) and to the map (12, N)."""
-    r = found.across / noise
-    on_line = np.where(found.good, geman_mcclure_weight(r / FAR), 0.0)
-    std = deviation(found, seen, noise, voxel)
-    d = -seen.distance / std
-    on_map = np.where(seen.known, on_line * geman_mcclure_weight(d / FAR / widened), 0.0)
-    return (found.by_pose[:6] / noise, on_line, r), (seen.by_poses / std, on_map, d)
+    r = triangulated.across / noise
+    on_line = np.where(triangulated.good, geman_mcclure_weight(r / FAR), 0.0)
+    std = deviation(triangulated, residuals, noise, voxel)
+    d = -residuals.distance / std
+    on_map = np.where(residuals.observed, on_line * geman_mcclure_weight(d / FAR / widened), 0.0)
+    return (triangulated.by_pose[:6] / noise, on_line, r), (residuals.by_poses / std, on_map, d)
 
 
 def _scatter(
-    block: NDArray[np.int_], found: Triangulated, seen: AgainstMap, noise: float, voxel: float
+    block: NDArray[np.int_],
+    triangulated: Triangulated,
+    residuals: AgainstMap,
+    noise: float,
+    voxel: float,
 ) -> Floats:
     """Return (12, 12) sum over blocks of g g^T, g being a block's share of b.
 
     Between two inverses of A it is the covariance of a step whatever errors the pixels of a block
     share (the sandwich of White and of Liang and Zeger, 1986, blocks as clusters).
     """
-    (across, on_line, r), (along, on_map, d) = _rows(found, seen, noise, voxel, 1.0)
+    (across, on_line, r), (along, on_map, d) = _rows(triangulated, residuals, noise, voxel, 1.0)
     scores = along * (on_map * d)
     scores[:6] += across * (on_line * r)
     count = int(block.max(initial=0)) + 1

@@ -53,10 +53,10 @@ class ProjectorDrift:
         """
         if self.held:
             return Prior(mean, np.diag(self.spread**-2.0))
-        known = np.isfinite(self.spread)
+        finite = np.isfinite(self.spread)
         information = np.zeros((6, 6))
-        if known.any():
-            at = np.ix_(known, known)
-            spread = covariance[at] + steps * np.diag(self.spread[known] ** 2)
+        if finite.any():
+            at = np.ix_(finite, finite)
+            spread = covariance[at] + steps * np.diag(self.spread[finite] ** 2)
             information[at] = np.linalg.inv(spread)
         return Prior(mean, information)

@@ -23,7 +23,7 @@ class Ranged:
     """(N,) flat indices of the usable pixels."""
     sample: PixelSample
     """Their correspondences."""
-    found: Triangulated
+    triangulated: Triangulated
     """Their points."""
 
 
@@ -38,11 +38,11 @@ def ranged(view: ThinnedMap, poses: Poses, projector: ProjectorModel, noise: flo
     """
     pixels = np.flatnonzero(view.usable)
     sample = view.correspondences(projector, pixels)
-    found = triangulate(sample, projector, poses.projector_from_camera)
-    seen = found.good & (np.abs(found.across) < FAR * noise)
+    triangulated = triangulate(sample, projector, poses.projector_from_camera)
+    on_lines = triangulated.good & (np.abs(triangulated.across) < FAR * noise)
     shape = view.usable.shape
     range_, weight = np.full(shape, np.nan), np.zeros(shape)
-    range_.ravel()[pixels[seen]] = found.range[seen]
-    weight.ravel()[pixels[seen]] = found.pixels_per_length[seen] ** 2
+    range_.ravel()[pixels[on_lines]] = triangulated.range[on_lines]
+    weight.ravel()[pixels[on_lines]] = triangulated.pixels_per_length[on_lines] ** 2
     frame = RangeFrame(range_, view.camera, poses.world_from_camera, weight)
-    return Ranged(frame, pixels, sample, found)
+    return Ranged(frame, pixels, sample, triangulated)

@@ -87,19 +87,21 @@ def load_state(folder: str | Path) -> Past:
         InputError: there is none, it is damaged, or another version wrote it.
     """
     folder = Path(folder)
-    places = [unfinished_of(folder) / FILE, folder / FILE]
-    path = next((place for place in places if is_file(place)), None)
+    candidates = [unfinished_of(folder) / FILE, folder / FILE]
+    path = next((candidate for candidate in candidates if is_file(candidate)), None)
     if path is None:
-        raise InputError("no such file", str(places[-1]), "name the folder of an earlier sequence")
-    found = load_objects(path, _WHAT, _TODO)
-    if not _is_state(found):
+        raise InputError(
+            "no such file", str(candidates[-1]), "name the folder of an earlier sequence"
+        )
+    objects = load_objects(path, _WHAT, _TODO)
+    if not _is_state(objects):
         raise InputError(f"is not a readable {_WHAT}", str(path), _TODO)
-    return Past(found["state"], found["marks"], found["reading"], str(path))
+    return Past(objects["state"], objects["marks"], objects["reading"], str(path))
 
 
-def _is_state(found: dict[str, Any]) -> bool:
+def _is_state(objects: dict[str, Any]) -> bool:
     """Tell whether objects are those of :func:`save_state`, as far as they are looked at first."""
-    state, marks = found.get("state"), found.get("marks")
+    state, marks = objects.get("state"), objects.get("marks")
     if not isinstance(state, dict) or not isinstance(marks, list):
         return False
     recorded = state.get("recorded")
@@ -108,7 +110,7 @@ def _is_state(found: dict[str, Any]) -> bool:
         and isinstance(recorded, Recorded)
         and isinstance(recorded.rig, Rig)
         and isinstance(recorded.rows, list)
-        and isinstance(found.get("reading"), FrameReading)
+        and isinstance(objects.get("reading"), FrameReading)
         and all(isinstance(mark, str) for mark in marks)
     )
 

@@ -166,10 +166,10 @@ class Run:
         """Place a frame and keep what is known of it."""
         began = time.perf_counter()
         number = len(self.recorded.rows)
-        found = view.reason if isinstance(view, Unread) else self._placed(number, view)
+        outcome = view.reason if isinstance(view, Unread) else self._placed(number, view)
         part = max(len(self.recorded.parts) - 1, 0)
         row = FrameRow(number, view.name, part=part)
-        row = replace(row, lost=found) if isinstance(found, str) else _row(row, found)
+        row = replace(row, lost=outcome) if isinstance(outcome, str) else _row(row, outcome)
         row = replace(row, seconds=time.perf_counter() - began)
         if row.keyframe and isinstance(frame, CorrespondenceMap):
             self.recorded.kept[part].offer(number, frame)
@@ -182,18 +182,18 @@ class Run:
             part = Part(beginning.setup, number, view, beginning.projector_pose, beginning.noise)
             self._append(part)
             return part.first
-        found = parts[-1].track(number, view)
-        if not isinstance(found, str):
+        outcome = parts[-1].track(number, view)
+        if not isinstance(outcome, str):
             self._missed = 0
-            self._tell_focal(found)
-            return found
+            self._tell_focal(outcome)
+            return outcome
         self._missed += 1
-        return self._new_part(number, view) if self._missed > LONG_LOSS else found
+        return self._new_part(number, view) if self._missed > LONG_LOSS else outcome
 
-    def _tell_focal(self, found: Tracked) -> None:
-        if found.placement is not None:
-            pose, noise = found.poses.projector_from_camera, found.placement.noise
-            told = told_of_focal(found.placement.found, pose, noise)
+    def _tell_focal(self, tracked: Tracked) -> None:
+        if tracked.placement is not None:
+            pose, noise = tracked.poses.projector_from_camera, tracked.placement.noise
+            told = told_of_focal(tracked.placement.triangulated, pose, noise)
             self.recorded.told = self.recorded.told.plus(*told)
 
     def _new_part(self, number: int, view: ThinnedMap) -> Tracked:
@@ -228,11 +228,11 @@ def _without_early(waiting: _Waiting, first: ThinnedMap) -> _Waiting:
     return early + waiting[at:]
 
 
-def _row(row: FrameRow, found: Tracked) -> FrameRow:
-    std, placement = np.sqrt(np.diag(found.covariance)), found.placement
+def _row(row: FrameRow, tracked: Tracked) -> FrameRow:
+    std, placement = np.sqrt(np.diag(tracked.covariance)), tracked.placement
     row = replace(
-        row, keyframe=found.keyframe, world_from_camera=found.poses.world_from_camera,
-        projector_from_camera=found.poses.projector_from_camera,
+        row, keyframe=tracked.keyframe, world_from_camera=tracked.poses.world_from_camera,
+        projector_from_camera=tracked.poses.projector_from_camera,
     )  # fmt: skip
     if placement is None:
         return row

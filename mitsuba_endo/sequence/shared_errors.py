@@ -19,8 +19,8 @@ class SharedErrors:
     def __init__(self) -> None:
         self._ratios: deque[Floats] = deque(maxlen=FRAMES)
 
-    def widened(self, found: Placement) -> Floats:
+    def widened(self, placement: Placement) -> Floats:
         """Return the covariance (12, 12) of a placed frame, errors that pixels share included."""
-        self._ratios.append(np.diag(found.clustered) / np.diag(found.covariance))
+        self._ratios.append(np.diag(placement.clustered) / np.diag(placement.covariance))
         factor = np.sqrt(np.maximum(np.mean(self._ratios, axis=0), 1.0))
-        return factor[:, None] * found.covariance * factor
+        return factor[:, None] * placement.covariance * factor

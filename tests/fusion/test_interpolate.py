@@ -29,16 +29,16 @@ def test_distance_and_gradient_of_a_plane(volume: Volume) -> None:
     points = rng.uniform(-3, 3, (500, 3))
     points -= ((points @ NORMAL + HEIGHT) - rng.uniform(-0.8, 0.8, 500))[:, None] * NORMAL
     found = interpolate(volume, points)
-    assert found.known.mean() > 0.95
+    assert found.observed.mean() > 0.95
     wanted = points @ NORMAL + HEIGHT
-    assert found.distance[found.known] == pytest.approx(wanted[found.known], abs=1e-3)
-    normals = np.broadcast_to(NORMAL, (int(found.known.sum()), 3))
-    assert found.gradient[found.known] == pytest.approx(normals, abs=5e-3)
+    assert found.distance[found.observed] == pytest.approx(wanted[found.observed], abs=1e-3)
+    normals = np.broadcast_to(NORMAL, (int(found.observed.sum()), 3))
+    assert found.gradient[found.observed] == pytest.approx(normals, abs=5e-3)
 
 
 def test_nothing_is_known_where_nothing_was_seen(volume: Volume) -> None:
     far = np.array([[0.0, 0.0, -30.0], [500.0, 0.0, 0.0]])
     found = interpolate(volume, far)
-    assert not found.known.any()
+    assert not found.observed.any()
     assert (found.distance == 0).all()
-    assert not interpolate(Volume(1.0), far).known.any()
+    assert not interpolate(Volume(1.0), far).observed.any()

@@ -149,7 +149,7 @@ def test_elimination_is_that_of_all_unknowns() -> None:
     x = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
     step = np.linalg.solve(at.A, at.b).astype(np.float64)
     assert step == pytest.approx(x[:37], abs=1e-5)  # responses are kept in single precision
-    assert at.ways(step) == pytest.approx(x[37:], abs=1e-5)
+    assert at.element_steps(step) == pytest.approx(x[37:], abs=1e-5)
 
 
 def test_derivatives_of_the_drift(loop: Recording) -> None:

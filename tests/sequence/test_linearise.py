@@ -82,13 +82,13 @@ def test_derivatives_of_distances_to_the_map(clean: Recording, volume: Volume) -
     found = triangulate(sample, clean.projector, poses.projector_from_camera)
     seen = against_map(sample, found, poses.world_from_camera, volume)
     for j in range(12):
-        h = 0.05 / np.median(np.abs(seen.by_poses[j, seen.known]))
+        h = 0.05 / np.median(np.abs(seen.by_poses[j, seen.observed]))
         ends = []
         for sign in (1, -1):
             moved = poses.moved(np.eye(12)[j] * sign * h)
             again = triangulate(sample, clean.projector, moved.projector_from_camera)
             ends.append(against_map(sample, again, moved.world_from_camera, volume))
-        both = seen.known & ends[0].known & ends[1].known
+        both = seen.observed & ends[0].observed & ends[1].observed
         slope = (ends[0].distance - ends[1].distance)[both] / (2 * h)
         wanted = seen.by_poses[j, both]
         assert np.sum(slope * wanted) / np.sum(wanted**2) == pytest.approx(1, abs=0.03)

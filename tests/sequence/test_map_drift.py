@@ -80,11 +80,11 @@ def test_bending_is_what_a_wrong_projector_does() -> None:
     found = place(sample, true, clean.projector, volume, held, 0.1)
     moved = true.world_from_camera.inverse() @ found.poses.world_from_camera
     bent = camera_by_projector(
-        sample, found.found, found.poses, clean.world_from_camera[0], clean.projector, volume
+        sample, found.triangulated, found.poses, clean.world_from_camera[0], clean.projector, volume
     )
     step = np.concatenate([Rotation.from_matrix(moved.R).as_rotvec(), moved.t])
-    seen = against_map(sample, found.found, found.poses.world_from_camera, volume)
-    felt, wanted = (seen.by_poses[6:, seen.known].T @ s for s in (step, bent @ off))
+    seen = against_map(sample, found.triangulated, found.poses.world_from_camera, volume)
+    felt, wanted = (seen.by_poses[6:, seen.observed].T @ s for s in (step, bent @ off))
     # Directions in which the tube hardly holds a camera are free in both: the wall decides.
     assert np.corrcoef(felt, wanted)[0, 1] > 0.8
     assert np.std(felt - wanted) < 0.6 * np.std(felt)

@@ -54,14 +54,14 @@ def adjust(
     """
     frames, design = list(frames), 1.0
     for widened in WIDENINGS:
-        seen = [observe(frame, elements, projector, widened) for frame in frames]
-        weights = [Weights(s.on_line, s.weight) for s in seen]
-        at = equations(seen, weights, len(elements.points))
-        design = _design(seen, weights)
+        all_observations = [observe(frame, elements, projector, widened) for frame in frames]
+        weights = [Weights(s.on_line, s.weight) for s in all_observations]
+        at = equations(all_observations, weights, len(elements.points))
+        design = _design(all_observations, weights)
         step = _step(at, frames, plan, design)
-        elements = elements.moved(at.ways(step))
+        elements = elements.moved(at.element_steps(step))
         projector = projector.with_(focal=float(projector.focal) * float(np.exp(step[-1])))
-        frames = _moved(frames, step, seen)
+        frames = _moved(frames, step, all_observations)
     return _finished(frames, elements, projector, plan, design)
 
 
@@ -80,11 +80,13 @@ def _step(at: Equations, frames: list[AdjustedFrame], plan: Plan, design: float)
     return step
 
 
-def _moved(frames: list[AdjustedFrame], step: Floats, seen: list[Seen]) -> list[AdjustedFrame]:
+def _moved(
+    frames: list[AdjustedFrame], step: Floats, all_observations: list[Seen]
+) -> list[AdjustedFrame]:
     baseline = float(np.linalg.norm(frames[0].poses.projector_from_camera.t))
     out = [
         replace(f, poses=f.poses.moved(step[FRAME * k : FRAME * (k + 1)]), noise=s.noise)
-        for k, (f, s) in enumerate(zip(frames, seen, strict=True))
+        for k, (f, s) in enumerate(zip(frames, all_observations, strict=True))
     ]
     pose = out[0].poses.projector_from_camera  # a step keeps the baseline's length to first order
     pose = RigidTransform(pose.R, pose.t * baseline / np.linalg.norm(pose.t))
@@ -96,22 +98,22 @@ def _finished(
     frames: list[AdjustedFrame], elements: Elements, projector: ProjectorModel, plan: Plan,
     design: float,
 ) -> Adjusted:  # fmt: skip
-    seen = [observe(frame, elements, projector, 1.0) for frame in frames]
-    weights = [curvature_weights(s) for s in seen]
-    at = equations(seen, weights, len(elements.points))
+    all_observations = [observe(frame, elements, projector, 1.0) for frame in frames]
+    weights = [curvature_weights(s) for s in all_observations]
+    at = equations(all_observations, weights, len(elements.points))
     A_drift, _ = drift_equations(frames, plan.drift)
     held, free = gauge(at.A, frames[0].poses.projector_from_camera, plan)
-    V = scatter(seen, at, weights) + design**2 * A_drift
-    known = covariance(at.A + design * A_drift + held, V, free)
-    return Adjusted(frames, projector, elements, known, at, design)
+    V = scatter(all_observations, at, weights) + design**2 * A_drift
+    uncertainty = covariance(at.A + design * A_drift + held, V, free)
+    return Adjusted(frames, projector, elements, uncertainty, at, design)
 
 
-def _design(seen: Sequence[Seen], weights: Sequence[Weights]) -> float:
+def _design(all_observations: Sequence[Seen], weights: Sequence[Weights]) -> float:
     """Return the mean ratio of variances of the projectors' gradients: by blocks over white."""
-    found, white = np.zeros(6), np.zeros(6)
-    for s, w in zip(seen, weights, strict=True):
+    by_block, white = np.zeros(6), np.zeros(6)
+    for s, w in zip(all_observations, weights, strict=True):
         rows, score = s.across_by_unknowns[:6], w.across * s.across
         sums = np.stack([np.bincount(s.block, row) for row in rows * score])
-        found += (sums**2).sum(1)
+        by_block += (sums**2).sum(1)
         white += (rows**2 * score**2).sum(1)
-    return max(float(np.mean(found / white)), 1.0)
+    return max(float(np.mean(by_block / white)), 1.0)

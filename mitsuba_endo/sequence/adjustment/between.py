@@ -94,17 +94,19 @@ def _place(frame: AdjustedFrame, adjusted: Adjusted, near: int, drift: Projector
     mean = neighbour.poses.projector_from_camera
     prior = drift.prior(mean, np.zeros((6, 6)), abs(frame.number - neighbour.number))
     for _ in range(STEPS):
-        seen = observe(frame, adjusted.elements, adjusted.projector, 1.0)
-        A, b = _equations(seen, Weights(seen.on_line, seen.weight), prior, frame, adjusted)
+        observations = observe(frame, adjusted.elements, adjusted.projector, 1.0)
+        A, b = _equations(
+            observations, Weights(observations.on_line, observations.weight), prior, frame, adjusted
+        )
         step = np.linalg.solve(A, b).astype(np.float64)
-        frame = replace(frame, poses=frame.poses.moved(step), noise=seen.noise)
-    seen = observe(frame, adjusted.elements, adjusted.projector, 1.0)
-    weights = curvature_weights(seen)
-    A, _ = _equations(seen, weights, prior, frame, adjusted)
+        frame = replace(frame, poses=frame.poses.moved(step), noise=observations.noise)
+    observations = observe(frame, adjusted.elements, adjusted.projector, 1.0)
+    weights = curvature_weights(observations)
+    A, _ = _equations(observations, weights, prior, frame, adjusted)
     own = np.linalg.inv(A).astype(np.float64)
-    V = _scatter(seen) / adjusted.design**2
+    V = _scatter(observations) / adjusted.design**2
     V[:6, :6] += prior.information
-    follows = _follows(seen, weights, adjusted)
+    follows = _follows(observations, weights, adjusted)
     follows[:6, FRAME * near : FRAME * near + 6] += prior.information
     shared = own @ follows @ adjusted.covariance.matrix @ follows.T @ own
     ratio = np.diag(own @ V @ own) / np.diag(own)
@@ -112,32 +114,38 @@ def _place(frame: AdjustedFrame, adjusted: Adjusted, near: int, drift: Projector
 
 
 def _equations(
-    seen: Seen, weights: Weights, prior: Prior, frame: AdjustedFrame, adjusted: Adjusted
+    observations: Seen, weights: Weights, prior: Prior, frame: AdjustedFrame, adjusted: Adjusted
 ) -> tuple[Floats, Floats]:
     """Return A (12, 12) and b (12,) of a step, pixels counting for as much as they tell."""
-    rows, across = seen.by_unknowns[:FRAME], seen.across_by_unknowns[:FRAME]
+    rows, across = observations.by_unknowns[:FRAME], observations.across_by_unknowns[:FRAME]
     A = ((rows * weights.along) @ rows.T + (across * weights.across) @ across.T) / adjusted.design
-    b = rows @ (weights.along * seen.along) + across @ (weights.across * seen.across)
+    b = rows @ (weights.along * observations.along) + across @ (
+        weights.across * observations.across
+    )
     b /= adjusted.design
     A[:6, :6] += prior.information
     b[:6] -= prior.information @ prior.pull(frame.poses)
     return A + 1e-12 * np.trace(A) * np.eye(FRAME), b
 
 
-def _scatter(seen: Seen) -> Floats:
+def _scatter(observations: Seen) -> Floats:
     """Return (12, 12) sum over blocks of the image of their gradients' squares."""
-    rows = seen.by_unknowns[:FRAME] * (seen.weight * seen.along)
-    rows += seen.across_by_unknowns[:FRAME] * (seen.on_line * seen.across)
-    sums = np.stack([np.bincount(seen.block, row) for row in rows]).astype(np.float64)
+    rows = observations.by_unknowns[:FRAME] * (observations.weight * observations.along)
+    rows += observations.across_by_unknowns[:FRAME] * (observations.on_line * observations.across)
+    sums = np.stack([np.bincount(observations.block, row) for row in rows]).astype(np.float64)
     return sums @ sums.T
 
 
-def _follows(seen: Seen, weights: Weights, adjusted: Adjusted) -> Floats:
+def _follows(observations: Seen, weights: Weights, adjusted: Adjusted) -> Floats:
     """Return (12, n) how the gradient goes with the adjusted unknowns, through the elements."""
-    by = seen.by_unknowns[:FRAME] * (weights.along * seen.by_element) / adjusted.design
+    by = (
+        observations.by_unknowns[:FRAME]
+        * (weights.along * observations.by_element)
+        / adjusted.design
+    )
     out = np.zeros((FRAME, len(adjusted.covariance.matrix)))
     for part in adjusted.equations.responses:
-        here = part.among(seen.element)
-        g = part.g[:, seen.element[here] - part.first]
+        here = part.among(observations.element)
+        g = part.g[:, observations.element[here] - part.first]
         out[:, part.columns] += by[:, here] @ g.T
     return out

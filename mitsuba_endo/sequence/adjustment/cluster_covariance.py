@@ -44,53 +44,57 @@ class Covariance:
         return float(np.sqrt(max(self.matrix[-1, -1], 0.0)))
 
 
-def curvature_weights(seen: Seen) -> Weights:
+def curvature_weights(observations: Seen) -> Weights:
     """Return weights that make the cost's second derivatives, in the mean over residuals."""
-    across = mean_curvature(seen.across)
-    along = mean_curvature(seen.along)
-    return Weights(np.full(len(seen.across), across), along * seen.on_line)
+    across = mean_curvature(observations.across)
+    along = mean_curvature(observations.along)
+    return Weights(np.full(len(observations.across), across), along * observations.on_line)
 
 
-def scatter(seen: Sequence[Seen], at: Equations, weights: Sequence[Weights]) -> Floats:
+def scatter(all_observations: Sequence[Seen], at: Equations, weights: Sequence[Weights]) -> Floats:
     """Return V (n, n), see the module.
 
     Args:
-        seen: by each frame, at the solution.
+        all_observations: by each frame, at the solution.
         at: equations under the curvature's weights.
         weights: these.
     """
     V = np.zeros_like(at.A)
-    for k, (s, w) in enumerate(zip(seen, weights, strict=True)):
+    for k, (s, w) in enumerate(zip(all_observations, weights, strict=True)):
         columns, scores = _scores(k, s, w, at)
         V[np.ix_(columns, columns)] += scores.T @ scores
     return V
 
 
 def _scores(
-    k: int, seen: Seen, weights: Weights, at: Equations
+    k: int, observations: Seen, weights: Weights, at: Equations
 ) -> tuple[NDArray[np.int64], Floats]:
     """Return the unknowns (C,) on which a frame's gradient depends, and its blocks' shares
     (blocks, C).
     """
-    size, information = len(at.A), at.information[seen.element]
-    known = information > 0
-    share = weights.along * seen.by_element**2 / np.where(known, information, 1.0)
-    left = (seen.along - seen.by_element * at.mean[seen.element]) / np.sqrt(
+    size, information = len(at.A), at.information[observations.element]
+    informed = information > 0
+    share = weights.along * observations.by_element**2 / np.where(informed, information, 1.0)
+    left = (observations.along - observations.by_element * at.mean[observations.element]) / np.sqrt(
         np.maximum(1 - share, _LEAST_LEFT)
     )
-    score = np.where(known, seen.weight * left, 0.0)
-    rows = seen.by_unknowns * score + seen.across_by_unknowns * (seen.on_line * seen.across)
+    score = np.where(informed, observations.weight * left, 0.0)
+    rows = observations.by_unknowns * score + observations.across_by_unknowns * (
+        observations.on_line * observations.across
+    )
     count = BLOCKS[0] * BLOCKS[1]
-    own = np.stack([np.bincount(seen.block, row, count) for row in rows], axis=1).astype(float)
+    own = np.stack([np.bincount(observations.block, row, count) for row in rows], axis=1).astype(
+        float
+    )
     parts = [(columns_of(k, size), own)]
     for response in at.responses:
-        here = response.among(seen.element)
+        here = response.among(observations.element)
         if here.start == here.stop:
             continue
         by_block = sp.csr_array(
             (
-                (score * seen.by_element)[here],
-                (seen.block[here], seen.element[here] - response.first),
+                (score * observations.by_element)[here],
+                (observations.block[here], observations.element[here] - response.first),
             ),
             shape=(count, response.g.shape[1]),
         )
@@ -102,11 +106,11 @@ def _summed(
     parts: Sequence[tuple[NDArray[np.int64], Floats]], size: int, count: int
 ) -> tuple[NDArray[np.int64], Floats]:
     columns = np.unique(np.concatenate([c for c, _ in parts]))
-    place = np.zeros(size, np.int64)
-    place[columns] = np.arange(len(columns))
+    column_index = np.zeros(size, np.int64)
+    column_index[columns] = np.arange(len(columns))
     out = np.zeros((count, len(columns)))
     for part, values in parts:
-        out[:, place[part]] += values  # a part has each column once
+        out[:, column_index[part]] += values  # a part has each column once
     return columns, out
 
 

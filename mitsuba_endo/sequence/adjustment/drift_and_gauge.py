@@ -44,13 +44,13 @@ def drift_equations(
     A, b = np.zeros((size, size)), np.zeros(size)
     information = np.where(np.isfinite(drift.spread), drift.spread**-2.0, 0.0)
     for k, (first, second) in enumerate(pairwise(frames)):
-        known = information / (1 if drift.held else second.number - first.number)
+        step_information = information / (1 if drift.held else second.number - first.number)
         step, J = _step_and_derivative(
             first.poses.projector_from_camera, second.poses.projector_from_camera
         )
         at = np.r_[FRAME * k : FRAME * k + 6, FRAME * (k + 1) : FRAME * (k + 1) + 6]
-        A[np.ix_(at, at)] += J.T @ (known[:, None] * J)
-        b[at] -= J.T @ (known * step)
+        A[np.ix_(at, at)] += J.T @ (step_information[:, None] * J)
+        b[at] -= J.T @ (step_information * step)
     return A, b
 
 

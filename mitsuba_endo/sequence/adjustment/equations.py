@@ -64,26 +64,28 @@ class Equations:
     """(M,) of each element on its way, poses given; 0 where fewer than two frames saw it."""
     responses: list[Response]
 
-    def ways(self, step: Floats) -> Floats:
+    def element_steps(self, step: Floats) -> Floats:
         """Return how far (M,) the elements go with a step of all other unknowns."""
-        ways = self.mean.copy()
+        steps = self.mean.copy()
         for part in self.responses:
-            ways[part.first : part.first + part.g.shape[1]] -= step[part.columns] @ part.g
-        return ways
+            steps[part.first : part.first + part.g.shape[1]] -= step[part.columns] @ part.g
+        return steps
 
 
-def equations(seen: Sequence[Seen], weights: Sequence[Weights], count: int) -> Equations:
+def equations(
+    all_observations: Sequence[Seen], weights: Sequence[Weights], count: int
+) -> Equations:
     """Sum what frames saw and eliminate the elements.
 
     Args:
-        seen: by each of the K frames.
+        all_observations: by each of the K frames.
         weights: of their observations.
         count: of elements, M.
     """
-    size = FRAME * len(seen) + 1
+    size = FRAME * len(all_observations) + 1
     A, b = np.zeros((size, size)), np.zeros(size)
-    information, mean = _elements(seen, weights, count)
-    for k, (s, w) in enumerate(zip(seen, weights, strict=True)):
+    information, mean = _elements(all_observations, weights, count)
+    for k, (s, w) in enumerate(zip(all_observations, weights, strict=True)):
         shared = information[s.element] > 0
         on_surface = np.where(shared, w.along, 0.0)
         left = s.along - s.by_element * mean[s.element]
@@ -92,7 +94,7 @@ def equations(seen: Sequence[Seen], weights: Sequence[Weights], count: int) -> E
         A[np.ix_(at, at)] += (rows * on_surface) @ rows.T
         A[np.ix_(at, at)] += (rows_across * w.across) @ rows_across.T
         b[at] += rows @ (on_surface * left) + rows_across @ (w.across * s.across)
-    responses = list(_responses(seen, weights, information, size))
+    responses = list(_responses(all_observations, weights, information, size))
     for part in responses:
         inside = information[part.first : part.first + part.g.shape[1]]
         A[np.ix_(part.columns, part.columns)] -= (part.g * inside) @ part.g.T
@@ -105,35 +107,35 @@ def columns_of(frame: int, size: int) -> Index:
 
 
 def _elements(
-    seen: Sequence[Seen], weights: Sequence[Weights], count: int
+    all_observations: Sequence[Seen], weights: Sequence[Weights], count: int
 ) -> tuple[Floats, Floats]:
     """Return the information on each element (M,), and its way with the poses as they are (M,)."""
     information, pull, frames = np.zeros(count), np.zeros(count), np.zeros(count)
-    for s, w in zip(seen, weights, strict=True):
+    for s, w in zip(all_observations, weights, strict=True):
         by = w.along * s.by_element
         information += np.bincount(s.element, by * s.by_element, count)
         pull += np.bincount(s.element, by * s.along, count)
         frames += np.bincount(s.element, minlength=count)
     information[frames < 2] = 0.0
-    known = information > 0
-    return information, np.where(known, pull / np.where(known, information, 1.0), 0.0)
+    informed = information > 0
+    return information, np.where(informed, pull / np.where(informed, information, 1.0), 0.0)
 
 
 def _responses(
-    seen: Sequence[Seen], weights: Sequence[Weights], information: Floats, size: int
+    all_observations: Sequence[Seen], weights: Sequence[Weights], information: Floats, size: int
 ) -> Iterator[Response]:
     edges = np.append(np.arange(0, len(information), CHUNK), len(information))
-    cuts = [np.searchsorted(s.element, edges) for s in seen]
+    cuts = [np.searchsorted(s.element, edges) for s in all_observations]
     for chunk, (first, end) in enumerate(pairwise(edges)):
         frames = [k for k, cut in enumerate(cuts) if cut[chunk + 1] > cut[chunk]]
         g = np.zeros((FRAME * len(frames) + 1, end - first))
         for i, k in enumerate(frames):
             part = slice(cuts[k][chunk], cuts[k][chunk + 1])
-            s, here = seen[k], seen[k].element[part] - first
+            s, here = all_observations[k], all_observations[k].element[part] - first
             by = s.by_unknowns[:, part] * (weights[k].along * s.by_element)[part]
             g[FRAME * i : FRAME * (i + 1), here] = by[:FRAME]
             g[-1, here] += by[FRAME]
-        known = information[first:end] > 0
-        g *= np.where(known, 1 / np.where(known, information[first:end], 1.0), 0.0)
+        informed = information[first:end] > 0
+        g *= np.where(informed, 1 / np.where(informed, information[first:end], 1.0), 0.0)
         columns = np.concatenate([[], *(columns_of(k, size)[:FRAME] for k in frames), [size - 1]])
         yield Response(int(first), columns.astype(np.int64), g.astype(np.float32))

@@ -123,14 +123,14 @@ def observe(
     noise = max(robust_std(across[near]), 1e-3) if near.any() else frame.noise
     by_camera = -np.concatenate([cross(rays * range_, normals), normals]) * (at.slope / cosine)
     on_line = np.where(near, geman_mcclure_weight(across / noise / FAR), 0.0)
-    seen = Seen(
+    observations = Seen(
         element, _blocks(pixel, frame.view.usable.shape), along / noise,
         np.concatenate([at.by_pose(at.tangent), by_camera, at.by_focal(at.tangent)]) / noise,
         at.slope / cosine / noise, across / noise,
         np.concatenate([at.by_pose(at.normal), 0 * by_camera, at.by_focal(at.normal)]) / noise,
         on_line, on_line * geman_mcclure_weight(along / noise / widened / FAR), noise,
     )  # fmt: skip
-    return seen.rows(seen.weight > _LEAST_WEIGHT)
+    return observations.rows(observations.weight > _LEAST_WEIGHT)
 
 
 def _in_view(

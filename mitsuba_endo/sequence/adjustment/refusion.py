@@ -102,13 +102,13 @@ def with_deviations(mesh: FusedMesh, adjusted: Adjusted) -> FusedMesh:
     from scipy.spatial import KDTree
 
     shared = np.zeros(len(adjusted.elements.points))
-    known = adjusted.covariance.matrix
+    covariance = adjusted.covariance.matrix
     for part in adjusted.equations.responses:
         g = part.g.astype(np.float64)
-        inside = known[np.ix_(part.columns, part.columns)]
+        inside = covariance[np.ix_(part.columns, part.columns)]
         shared[part.first : part.first + g.shape[1]] = np.einsum("cm,cm->m", g, inside @ g)
-    seen = np.flatnonzero(adjusted.equations.information > 0)
-    near = seen[KDTree(adjusted.elements.points[seen]).query(mesh.vertices)[1]]
+    informed = np.flatnonzero(adjusted.equations.information > 0)
+    near = informed[KDTree(adjusted.elements.points[informed]).query(mesh.vertices)[1]]
     return replace(mesh, std=np.hypot(mesh.std, np.sqrt(np.maximum(shared[near], 0.0))))
 
 
