@@ -84,7 +84,7 @@ def calibrate(
     if images:
         more: dict[str, Any] = {"masked": masks.applied} if masks else {}
         if progress:
-            more["say"] = progress
+            more["progress"] = progress
         found = calibrated_again(found, maps, images, pattern, record, options, more)
     return Result(replace(found, photographs=seen), record)
 

@@ -60,7 +60,7 @@ class Photographs:
         more: dict[str, Any] = {"masked": masks.applied} if masks else {}
         found, calibration = second_round(
             first, maps, self._pictures(), grid_image(grid), rig, options,
-            say=advance, observe=observe, **more,
+            progress=advance, observe=observe, **more,
         )  # fmt: skip
         self.output.print(found.line())
         if calibration is not first:

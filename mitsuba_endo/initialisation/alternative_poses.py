@@ -81,8 +81,8 @@ def alternative_poses(
     bounds = (focal / _FOCAL_FACTOR, focal * _FOCAL_FACTOR)
     problem = RefinementProblem(projector, refine_focal, bounds, noise_px)
     unit = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
-    found = distinct(propose(few, projector, np.array([focal])), _PROPOSALS)
-    starts = [(unit, focal), *((p.pose, p.focal) for p in found)]
+    proposals = distinct(propose(few, projector, np.array([focal])), _PROPOSALS)
+    starts = [(unit, focal), *((p.pose, p.focal) for p in proposals)]
     return _rated(problem, unit, refine(problem, starts, some), some)
 
 
@@ -109,11 +109,11 @@ def _rated(
         decided, better = cost - lowest > margin, lowest - cost > margin
         if m.same_as(itself) or (decided and cost > SIMILAR_COST * lowest):
             continue
-        found = m.candidate
+        candidate = m.candidate
         ratio = cost / lowest
         out.append(
             AlternativePose(
-                found.projector_from_camera, found.focal, ratio, decided, better, planar
+                candidate.projector_from_camera, candidate.focal, ratio, decided, better, planar
             )
         )
     return sorted(out, key=lambda r: r.cost_ratio)

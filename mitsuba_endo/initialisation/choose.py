@@ -99,8 +99,10 @@ def refine(
     if not minima:
         return []
     best = minima[0].state
-    twins = _graduated(problem, _twins(best, data), data, GRADUATED_PX[1:], alternative=best)
-    redescended = [_redescend(problem, s, data) for s in twins]
+    alternatives = _graduated(
+        problem, _alternatives(best, data), data, GRADUATED_PX[1:], alternative=best
+    )
+    redescended = [_redescend(problem, s, data) for s in alternatives]
     return ranked([*minima, *_valid(redescended, data)])
 
 
@@ -166,14 +168,14 @@ def _competitive(
     return [s for s in states if costs[id(s)] <= HOPELESS * costs[id(best)]]
 
 
-def _twins(best: EpipolarState, data: Correspondences) -> list[EpipolarState]:
+def _alternatives(best: EpipolarState, data: Correspondences) -> list[EpipolarState]:
     noise_angle = robust_scale(best) / best.projector.focal
     poses = [
-        facing(pose, data, best.seen, noise_angle)[0]
-        for pose in planar_poses(data, best.seen, 4 * noise_angle)
+        facing(pose, data, best.bearings, noise_angle)[0]
+        for pose in planar_poses(data, best.bearings, 4 * noise_angle)
     ]
     return [
-        evaluate(pose, best.projector, data, best.seen)
+        evaluate(pose, best.projector, data, best.bearings)
         for pose in poses
         if not same_pose(pose, best.pose, 0.03)
     ]
@@ -272,9 +274,9 @@ def _turned_to_front(state: EpipolarState, data: Correspondences) -> Minimum:
     scale = robust_scale(state)
     near = np.abs(state.r) < 5 * scale
     inliers = data.take(near)
-    seen = state.seen.take(near)
-    pose, front = facing(state.pose, inliers, seen, 3 * scale / state.projector.focal)
-    return Minimum(evaluate(pose, state.projector, data, state.seen), front)
+    pattern_bearings = state.bearings.take(near)
+    pose, front = facing(state.pose, inliers, pattern_bearings, 3 * scale / state.projector.focal)
+    return Minimum(evaluate(pose, state.projector, data, state.bearings), front)
 
 
 def _same(a: EpipolarState, b: EpipolarState) -> bool:

@@ -38,7 +38,7 @@ def depth_image(state: EpipolarState, data: Correspondences, shape: tuple[int, i
         shape: height and width of the map.
     """
     scale = robust_scale(state)
-    at_camera, at_projector, _ = ranges(state.pose, state.seen, state.at)
+    at_camera, at_projector, _ = ranges(state.pose, state.bearings, state.at)
     keep = (np.abs(state.r) <= KEEP * scale) & (at_camera > 0) & (at_projector > 0)
     keep &= np.isfinite(at_camera)
     depth = np.full(shape, np.nan)

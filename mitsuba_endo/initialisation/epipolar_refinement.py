@@ -56,7 +56,7 @@ class EpipolarState:
     pose: RigidTransform
     """projector_from_camera, |t| = 1."""
     projector: ProjectorModel
-    seen: Bearings
+    bearings: Bearings
     at: Residuals
 
     @property
@@ -69,12 +69,14 @@ def evaluate(
     pose: RigidTransform,
     projector: ProjectorModel,
     data: Correspondences,
-    seen: Bearings | None = None,
+    pattern_bearings: Bearings | None = None,
 ) -> EpipolarState:
-    """Return the state at a calibration; ``seen`` are the bearings where they are known already."""
-    if seen is None:
-        seen = bearings(projector, data.q)
-    return EpipolarState(pose, projector, seen, residuals(pose, data.rays, seen))
+    """Return the state at a calibration; ``pattern_bearings`` where they are known already."""
+    if pattern_bearings is None:
+        pattern_bearings = bearings(projector, data.q)
+    return EpipolarState(
+        pose, projector, pattern_bearings, residuals(pose, data.rays, pattern_bearings)
+    )
 
 
 def minimise(
@@ -132,7 +134,9 @@ def _normal_equations(
     state: EpipolarState, data: Correspondences, loss: EpipolarLoss, refine_focal: bool
 ) -> tuple[Vectors, Vectors]:
     r = state.r
-    J = jacobian(state.pose, state.projector, data.rays, data.q, state.seen, state.at, refine_focal)
+    J = jacobian(
+        state.pose, state.projector, data.rays, data.q, state.bearings, state.at, refine_focal
+    )
     J = np.where(np.isfinite(J).all(0), J, 0.0)
     weighted = J * loss.weight(r)
     return weighted @ J.T, weighted @ r
@@ -149,8 +153,8 @@ def _moved(state: EpipolarState, step: Vectors, data: Correspondences) -> Epipol
     t = state.pose.t + tangent_basis(state.pose.t) @ step[3:5]
     pose = RigidTransform(rotation_from_vector(step[:3]) @ state.pose.R, t / np.linalg.norm(t))
     if step.size == 5:
-        return evaluate(pose, state.projector, data, state.seen)
+        return evaluate(pose, state.projector, data, state.bearings)
     # A longer step than this is a singular matrix speaking, not the data.
     focal = state.projector.focal * float(np.exp(np.clip(step[5], -0.7, 0.7)))
     projector = state.projector.with_(focal=focal)
-    return evaluate(pose, projector, data, bearings(projector, data.q, state.seen))
+    return evaluate(pose, projector, data, bearings(projector, data.q, state.bearings))

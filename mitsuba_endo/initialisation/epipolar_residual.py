@@ -109,7 +109,7 @@ def _undistorted(
     return distortion.remove(a, b)
 
 
-def residuals(pose: RigidTransform, rays: Vectors, seen: Bearings) -> Residuals:
+def residuals(pose: RigidTransform, rays: Vectors, pattern_bearings: Bearings) -> Residuals:
     """Return the epipolar residuals of camera rays (3, N) and their bearings.
 
     Args:
@@ -117,20 +117,22 @@ def residuals(pose: RigidTransform, rays: Vectors, seen: Bearings) -> Residuals:
     """
     turned = pose.R @ rays
     normal = skew(pose.t) @ turned
-    e = dot(seen.b, normal)
-    e_u, e_v = dot(seen.b_u, normal), dot(seen.b_v, normal)
+    e = dot(pattern_bearings.b, normal)
+    e_u, e_v = dot(pattern_bearings.b_u, normal), dot(pattern_bearings.b_v, normal)
     # At the epipole every direction fits: a tiny floor makes that 0 / floor instead of 0 / 0.
     slope = np.sqrt(e_u * e_u + e_v * e_v) + 1e-100
     return Residuals(e / slope, slope, (e_u / slope, e_v / slope), turned)
 
 
-def pose_jacobian(pose: RigidTransform, seen: Bearings, at: Residuals) -> Vectors:
+def pose_jacobian(pose: RigidTransform, pattern_bearings: Bearings, at: Residuals) -> Vectors:
     """Return dr/dp (6, N) for p = (w, dt) with R' = exp([w]x) R and t' = t + dt.
 
     With s = r grad(e)/|grad(e)| the derivative of e/|grad e| is that of e with b replaced by
     b - B s, all over |grad e|.
     """
-    corrected = seen.b - at.r * (at.unit_slope[0] * seen.b_u + at.unit_slope[1] * seen.b_v)
+    corrected = pattern_bearings.b - at.r * (
+        at.unit_slope[0] * pattern_bearings.b_u + at.unit_slope[1] * pattern_bearings.b_v
+    )
     corrected /= at.slope
     t = pose.t
     # b . (t x (w x d)) = w . (b (t . d) - t (b . d)) with d the turned ray.
@@ -144,7 +146,7 @@ def jacobian(
     projector: ProjectorModel,
     rays: Vectors,
     q: Vectors,
-    seen: Bearings,
+    pattern_bearings: Bearings,
     at: Residuals,
     refine_focal: bool,
 ) -> Vectors:
@@ -154,9 +156,11 @@ def jacobian(
     column is a forward difference: it needs second derivatives of the law.
     """
     rows = np.empty((5 + refine_focal, at.r.size))
-    of_pose = pose_jacobian(pose, seen, at)
+    of_pose = pose_jacobian(pose, pattern_bearings, at)
     rows[:3], rows[3:5] = of_pose[:3], tangent_basis(pose.t).T @ of_pose[3:]
     if refine_focal:
         nudged = projector.with_(focal=projector.focal * np.exp(_LOG_FOCAL_STEP))
-        rows[5] = (residuals(pose, rays, bearings(nudged, q, seen)).r - at.r) / _LOG_FOCAL_STEP
+        rows[5] = (
+            residuals(pose, rays, bearings(nudged, q, pattern_bearings)).r - at.r
+        ) / _LOG_FOCAL_STEP
     return rows

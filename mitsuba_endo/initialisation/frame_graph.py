@@ -84,7 +84,7 @@ class FrameGraph:
         usable = [k for k, frame in enumerate(self.frames) if frame.usable]
         return self.group_of(max(usable, key=lambda k: len(self.group_of(k))))
 
-    def placements(self, root: int) -> dict[int, ChainedFrame]:
+    def chained_frames(self, root: int) -> dict[int, ChainedFrame]:
         """Return where the frames joined to ``root`` are, itself included."""
         return self._walk(root)
 
@@ -144,9 +144,9 @@ class FrameGraph:
         pair = refine_pair(guess, target, source, self._rng)
         if pair.fit.fault:
             return None if pair.fit.fault == FLAT else False
-        found = pair.target_from_source
-        shift = np.linalg.norm(found.t - guess.t)
-        return bool(found.angle_to(guess)[0] < SAME_TURN and shift < SAME_SHIFT)
+        refined = pair.target_from_source
+        shift = np.linalg.norm(refined.t - guess.t)
+        return bool(refined.angle_to(guess)[0] < SAME_TURN and shift < SAME_SHIFT)
 
     def _placement(self, j: int, k: int) -> PairRegistration:
         """Return the placement of frame ``k`` in frame ``j``."""

@@ -40,8 +40,8 @@ def known_start(
     q = checked_map(q, camera)
     pose = RigidTransform(pose.R, pose.t / np.linalg.norm(pose.t))
     data = gather(q, clean_map(q) if usable is None else usable, camera)
-    seen = depth_image(evaluate(pose, projector, data), data, (camera.height, camera.width))
-    return Start(projector, pose, seen.depth, seen.used, seen.scale_px)
+    image = depth_image(evaluate(pose, projector, data), data, (camera.height, camera.width))
+    return Start(projector, pose, image.depth, image.used, image.scale_px)
 
 
 def start_at_pose(
@@ -85,5 +85,5 @@ def _misfit(data: Correspondences, projector: ProjectorModel, pose: RigidTransfo
     """Return the robust residual scale over the share of points before both devices."""
     at = evaluate(pose, projector, data)
     scale = robust_scale(at)
-    sign = in_front(pose, at.seen, at.at, scale / float(projector.focal))
+    sign = in_front(pose, at.bearings, at.at, scale / float(projector.focal))
     return scale / max(float(np.mean(sign >= 0)), 1e-3)

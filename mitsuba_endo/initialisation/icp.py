@@ -55,7 +55,7 @@ class Match:
     """(B, N) distance from the target's tangent plane divided by its relative noise."""
     weight: Floats
     """(B, N) 1 / relative noise; zero where the target sees nothing."""
-    seen: NDArray[np.bool_]
+    in_view: NDArray[np.bool_]
     """(B, N) the target sees something in that direction."""
     partner: NDArray[np.bool_]
     """(B, N) ... and it may be the same place."""
@@ -83,27 +83,27 @@ def match(target_from_source: Similarities, source: Source, target: Level, scale
     turned = target_from_source.rotate(source.normals)
     at = target.look_up(moved)
     points, normals = target.points[at], target.normals[at]
-    seen = at < target.size
+    in_view = at < target.size
     weight = np.minimum(target.weights[at], source.weights)
     gap = moved - points
     residual = np.einsum("bnk,bnk->bn", normals, gap) * weight
     # A camera model without a branch mask also projects points from behind: demand nearness.
     near = np.einsum("bnk,bnk->bn", gap, gap) < FAR**2
     alike = np.einsum("bnk,bnk->bn", normals, turned) > MIN_NORMAL_COSINE
-    partner = seen & near & alike & (np.abs(residual) < NEAR * scale)
-    return Match(moved, normals, turned, residual, weight, seen, partner)
+    partner = in_view & near & alike & (np.abs(residual) < NEAR * scale)
+    return Match(moved, normals, turned, residual, weight, in_view, partner)
 
 
-def cost(found: Match, scale: float) -> tuple[Floats, Floats]:
+def cost(matches: Match, scale: float) -> tuple[Floats, Floats]:
     """Return the mean cost (B,) in 0..1 of points in common view and the overlap (B,).
 
     The cost is Geman-McClure's; a point without a partner where the target sees something costs 1.
     """
-    squared = (found.residual / scale) ** 2
-    rho = np.where(found.partner, squared / (1 + squared), 1.0) * found.seen
-    seen = found.seen.mean(1)
-    overlap = found.partner.mean(1)
-    return rho.mean(1) / np.maximum(seen, 1e-9), overlap
+    squared = (matches.residual / scale) ** 2
+    rho = np.where(matches.partner, squared / (1 + squared), 1.0) * matches.in_view
+    in_view = matches.in_view.mean(1)
+    overlap = matches.partner.mean(1)
+    return rho.mean(1) / np.maximum(in_view, 1e-9), overlap
 
 
 def align(
@@ -112,27 +112,27 @@ def align(
     """Take Gauss-Newton steps under a Geman-McClure loss of the given scale from every start."""
     pose = target_from_source
     for _ in range(steps):
-        found = match(pose, source, target, scale)
-        A, b, about = normal_equations(pose, found, scale)
+        matches = match(pose, source, target, scale)
+        A, b, about = normal_equations(pose, matches, scale)
         step = np.linalg.solve(A, -b[..., None])[..., 0].astype(np.float64)
         pose = pose.moved(np.clip(step, -MAX_STEP, MAX_STEP), about)
     return pose
 
 
 def normal_equations(
-    pose: Similarities, found: Match, scale: float
+    pose: Similarities, matches: Match, scale: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return A (B, 7, 7), b (B, 7) and the centres (B, 3) of a step (w, dt, d log s).
 
     Weights are relative to the number of points; the prior on scale and a slight damping are in.
     """
-    J, about = jacobian(found.moved, found.normals)
-    n = found.residual.shape[1]
-    robust = found.partner * geman_mcclure_weight(found.residual / scale) / n
+    J, about = jacobian(matches.moved, matches.normals)
+    n = matches.residual.shape[1]
+    robust = matches.partner * geman_mcclure_weight(matches.residual / scale) / n
     # Both the row and the residual carry the noise weight; the residual has it already.
-    weighted = J * (robust * found.weight)[..., None]
-    A = np.swapaxes(weighted, 1, 2) @ (J * found.weight[..., None])
-    b = np.einsum("bnk,bn->bk", weighted, found.residual)
+    weighted = J * (robust * matches.weight)[..., None]
+    A = np.swapaxes(weighted, 1, 2) @ (J * matches.weight[..., None])
+    b = np.einsum("bnk,bn->bk", weighted, matches.residual)
     # The prior counts like one part in a hundred of the points at the loss's own scale.
     prior = 0.01 * (scale / SCALE_SPREAD) ** 2
     diagonal = np.arange(7)

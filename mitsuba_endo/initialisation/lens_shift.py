@@ -69,7 +69,7 @@ class LensShift:
 
     centre: tuple[float, float]
     """Pattern pixels; the middle of the pattern unless another is clearly better."""
-    found: bool
+    off_middle: bool
     """Whether another is."""
     scale_px: float
     """Robust scale of the residuals at the best centre, pattern pixels; the worst frame's."""
@@ -129,9 +129,9 @@ def find_lens_shift(
     for share in HEIGHTS:
         moved = projector.with_(centre=(middle[0], share * (height - 1)))
         states = [_best(f, moved, width, refine_focal, focal_guess) for f in frames]
-        known = [s for s in states if s is not None]
-        if len(known) == len(frames):
-            tried[share] = known
+        fitted = [s for s in states if s is not None]
+        if len(fitted) == len(frames):
+            tried[share] = fitted
     if not tried:
         return LensShift(middle, False, np.inf, np.inf, [])
     ranked = sorted(tried, key=lambda v: _scale(tried[v]))
@@ -142,10 +142,10 @@ def find_lens_shift(
     settled = [_settled(frames, states, refine_focal) for states in ends]
     best = min([*(s for s in settled if s), tried[ranked[0]]], key=_scale)
     scale, there = _scale(best), _scale(tried[MIDDLE]) if MIDDLE in tried else np.inf
-    found = scale < BETTER * there
-    y = float(best[0].projector.centre[1]) if found else middle[1]
-    states = best if found else tried.get(MIDDLE, [])
-    return LensShift((middle[0], y), found, scale, there, states)
+    off_middle = scale < BETTER * there
+    y = float(best[0].projector.centre[1]) if off_middle else middle[1]
+    states = best if off_middle else tried.get(MIDDLE, [])
+    return LensShift((middle[0], y), off_middle, scale, there, states)
 
 
 def _best(

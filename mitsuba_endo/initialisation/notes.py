@@ -55,7 +55,7 @@ def is_planar(state: EpipolarState, data: Correspondences) -> bool:
     distances in pattern pixels.
     """
     scale = robust_scale(state)
-    inverse = 1 / ranges(state.pose, state.seen, state.at)[0]
+    inverse = 1 / ranges(state.pose, state.bearings, state.at)[0]
     near = (np.abs(state.r) < 5 * scale) & np.isfinite(inverse)
     rays, inverse = data.rays[:, near], inverse[near]
     if inverse.size < 10:

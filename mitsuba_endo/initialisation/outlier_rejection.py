@@ -28,14 +28,14 @@ def clean_map(q: NDArray[np.float64]) -> NDArray[np.bool_]:
     Args:
         q: (H, W, 2) pattern pixels, NaN = missing.
     """
-    seen = np.asarray(np.isfinite(q).all(-1))
-    if not seen.any():
-        return seen
-    smooth = median_filter(q, seen)
-    off = np.abs(np.where(seen[..., None], q, smooth) - smooth).max(-1)
+    finite = np.asarray(np.isfinite(q).all(-1))
+    if not finite.any():
+        return finite
+    smooth = median_filter(q, finite)
+    off = np.abs(np.where(finite[..., None], q, smooth) - smooth).max(-1)
     # Noisy maps scatter around their median: the bound grows with the scatter.
-    bound = max(OUTLIER_PX, 5 * robust_std(off[seen]))
-    return large_patches(smooth, seen & (off <= bound))
+    bound = max(OUTLIER_PX, 5 * robust_std(off[finite]))
+    return large_patches(smooth, finite & (off <= bound))
 
 
 def noise_scale(q: NDArray[np.float64], usable: NDArray[np.bool_]) -> float:
@@ -52,30 +52,30 @@ def noise_scale(q: NDArray[np.float64], usable: NDArray[np.bool_]) -> float:
 
 
 def median_filter(
-    values: NDArray[np.float64], seen: NDArray[np.bool_], size: int = MEDIAN_SIZE
+    values: NDArray[np.float64], valid: NDArray[np.bool_], size: int = MEDIAN_SIZE
 ) -> NDArray[np.float32]:
     """Return the median of ``values`` (H, W, C) over size x size pixels (3 or 5).
 
     Missing pixels take the value of the nearest seen one first, which keeps the filter a fast
     OpenCV call.
     """
-    filled = fill_nearest(values.astype(np.float32), seen)
+    filled = fill_nearest(values.astype(np.float32), valid)
     channels = [
         cv2.medianBlur(np.ascontiguousarray(filled[..., c]), size) for c in range(filled.shape[-1])
     ]
     return np.stack(channels, -1).astype(np.float32, copy=False)
 
 
-def fill_nearest(values: NDArray, seen: NDArray[np.bool_]) -> NDArray:
-    """Return ``values`` (H, W, C) with each pixel outside ``seen`` (H, W) set to its nearest."""
-    if seen.all():
+def fill_nearest(values: NDArray, valid: NDArray[np.bool_]) -> NDArray:
+    """Return ``values`` (H, W, C) with each pixel outside ``valid`` (H, W) set to its nearest."""
+    if valid.all():
         return values
-    _, found = cv2.distanceTransformWithLabels(
-        (~seen).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    _, label_image = cv2.distanceTransformWithLabels(
+        (~valid).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
-    labels = np.asarray(found, np.intp)
+    labels = np.asarray(label_image, np.intp)
     source = np.zeros(labels.max() + 1, np.intp)
-    source[labels[seen]] = np.flatnonzero(seen)
+    source[labels[valid]] = np.flatnonzero(valid)
     return values.reshape(-1, values.shape[-1])[source[labels]]
 
 
@@ -107,6 +107,6 @@ def _patches(
     grid[::2, ::2] = usable
     grid[::2, 1::2] = link_across
     grid[1::2, ::2] = link_down
-    found = cv2.connectedComponents(grid, connectivity=4, ltype=cv2.CV_32S)[1]
-    labels = np.asarray(found[::2, ::2], np.int32)
+    label_image = cv2.connectedComponents(grid, connectivity=4, ltype=cv2.CV_32S)[1]
+    labels = np.asarray(label_image[::2, ::2], np.int32)
     return labels, np.bincount(labels.ravel())

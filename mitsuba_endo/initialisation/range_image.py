@@ -95,8 +95,8 @@ class RangePyramid:
 
 def typical_range(image: RangeImage) -> float:
     """Return the median range; NaN for an empty image."""
-    seen = image.range[np.isfinite(image.range)]
-    return float(np.median(seen)) if seen.size else float("nan")
+    ranges = image.range[np.isfinite(image.range)]
+    return float(np.median(ranges)) if ranges.size else float("nan")
 
 
 def make_level(image: RangeImage, block: int, unit: float) -> Level:
@@ -127,12 +127,12 @@ def _block_means(image: RangeImage, unit: float, block: int) -> Floats:
     rows, columns = image.range.shape[0] // block, image.range.shape[1] // block
     crop = (slice(rows * block), slice(columns * block))
     ranges = image.range[crop] / unit
-    seen = np.isfinite(ranges) & (ranges > 0)
-    ranges = np.where(seen, ranges, 0.0)
+    valid = np.isfinite(ranges) & (ranges > 0)
+    ranges = np.where(valid, ranges, 0.0)
     stacked = np.concatenate(
         [
             image.rays[crop] * ranges[..., None],
-            np.stack([seen, ranges, ranges * ranges], -1, dtype=np.float64),
+            np.stack([valid, ranges, ranges * ranges], -1, dtype=np.float64),
         ],
         axis=-1,
     )

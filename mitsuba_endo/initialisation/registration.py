@@ -83,16 +83,16 @@ def register_frames(
 
 def _collect(graph: FrameGraph, unit: float) -> list[Registration]:
     group = graph.largest_group()
-    placed = graph.placements(group[0])
+    chained = graph.chained_frames(group[0])
     return [
-        _placed(placed[k], unit, is_world=k == group[0])
-        if k in placed
+        _registration(chained[k], unit, is_world=k == group[0])
+        if k in chained
         else _left_out(graph, k, group)
         for k in range(len(graph.frames))
     ]
 
 
-def _placed(frame: ChainedFrame, unit: float, *, is_world: bool) -> Registration:
+def _registration(frame: ChainedFrame, unit: float, *, is_world: bool) -> Registration:
     where, fit = frame.root_from_frame, frame.last.fit
     pose = RigidTransform(where.R[0], unit * where.t[0])
     residual, overlap = (0.0, 1.0) if is_world else (fit.residual, fit.overlap[0])

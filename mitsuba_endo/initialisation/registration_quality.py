@@ -91,34 +91,35 @@ def judge(
     there = match(pose, sample(source.fine, JUDGED_POINTS, rng), target.fine, GATE_SCALE)
     back = match(pose.inverse(), sample(target.fine, JUDGED_POINTS, rng), source.fine, GATE_SCALE)
     residual = max(_residual(there), _residual(back))
-    partners, seen = there.partner.sum() + back.partner.sum(), there.seen.sum() + back.seen.sum()
+    partners = there.partner.sum() + back.partner.sum()
+    in_view = there.in_view.sum() + back.in_view.sum()
     return RegistrationQuality(
         residual,
         (float(there.partner.mean()), float(back.partner.mean())),
-        1 - float(partners) / max(float(seen), 1.0),
-        float(there.seen.mean() + back.seen.mean()) / 2,
+        1 - float(partners) / max(float(in_view), 1.0),
+        float(there.in_view.mean() + back.in_view.mean()) / 2,
         _weakness(there, residual),
     )
 
 
-def _residual(found: Match) -> float:
+def _residual(matches: Match) -> float:
     """Return the robust standard deviation; points in common view without partner are far."""
-    distance = np.where(found.partner, found.residual, 1.0)[found.seen]
+    distance = np.where(matches.partner, matches.residual, 1.0)[matches.in_view]
     return robust_std(distance) if distance.size else np.inf
 
 
-def _weakness(found: Match, residual: float) -> float:
+def _weakness(matches: Match, residual: float) -> float:
     """Return the standard deviation of the placement in its worst-determined direction.
 
     Noise in the normals makes even a plane look informative in J^T J. The noises of source and
     target are independent, so the cross product J_target^T J_source is free of it on average.
     """
-    at = found.partner[0]
+    at = matches.partner[0]
     if at.sum() < 10:
         return np.inf
-    moved, weight = found.moved[:, at], found.weight[0, at, None]
-    ahead, _ = jacobian(moved, found.normals[:, at])
-    behind, _ = jacobian(moved, found.source_normals[:, at])
+    moved, weight = matches.moved[:, at], matches.weight[0, at, None]
+    ahead, _ = jacobian(moved, matches.normals[:, at])
+    behind, _ = jacobian(moved, matches.source_normals[:, at])
     cross = (weight * ahead[0]).T @ (weight * behind[0]) / (weight**2).sum()
     least = float(np.linalg.eigvalsh((cross + cross.T) / 2)[0])
     return residual / np.sqrt(INDEPENDENT_POINTS * least) if least > 0 else np.inf

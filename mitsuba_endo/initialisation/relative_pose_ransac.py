@@ -66,8 +66,8 @@ def propose(data: Correspondences, projector: ProjectorModel, focals: Vectors) -
         focals: (F,) pattern pixels.
     """
     with ThreadPoolExecutor() as pool:
-        found = pool.map(lambda f: _at_focal(data, projector.with_(focal=float(f))), focals)
-        return sorted((p for proposals in found for p in proposals), key=lambda p: p.score)
+        of_focals = pool.map(lambda f: _at_focal(data, projector.with_(focal=float(f))), focals)
+        return sorted((p for proposals in of_focals for p in proposals), key=lambda p: p.score)
 
 
 def ladder(projector: ProjectorModel, width: int, data: Correspondences) -> Vectors:
@@ -79,8 +79,8 @@ def ladder(projector: ProjectorModel, width: int, data: Correspondences) -> Vect
     rungs = LADDER * width
 
     def reached(focal: float) -> bool:
-        seen = bearings(projector.with_(focal=focal), data.q)
-        return float(np.isfinite(seen.b[2]).mean()) > _IN_RANGE
+        pattern_bearings = bearings(projector.with_(focal=focal), data.q)
+        return float(np.isfinite(pattern_bearings.b[2]).mean()) > _IN_RANGE
 
     if reached(rungs[0]):
         return rungs
@@ -128,7 +128,9 @@ def same_pose(a: RigidTransform, b: RigidTransform, angle: float) -> bool:
     return rotation_angle(a.R @ b.R.T) < angle and angle_between(a.t, b.t) < 2 * angle
 
 
-def planar_poses(data: Correspondences, seen: Bearings, threshold: float) -> list[RigidTransform]:
+def planar_poses(
+    data: Correspondences, pattern_bearings: Bearings, threshold: float
+) -> list[RigidTransform]:
     """Return the poses that explain the data as one plane, up to four, |t| = 1.
 
     On a plane the homography of bearings is R + t n^T / distance, which two poses in front of
@@ -137,7 +139,7 @@ def planar_poses(data: Correspondences, seen: Bearings, threshold: float) -> lis
     Args:
         threshold: inlier distance on the plane z = 1 of the projector.
     """
-    pairs = _on_unit_plane(data, seen)
+    pairs = _on_unit_plane(data, pattern_bearings)
     if pairs is None:
         return []
     H, _ = cv2.findHomography(*pairs, method=cv2.RANSAC, ransacReprojThreshold=threshold,
@@ -150,33 +152,37 @@ def planar_poses(data: Correspondences, seen: Bearings, threshold: float) -> lis
 
 
 def facing(
-    pose: RigidTransform, data: Correspondences, seen: Bearings, noise_angle: float
+    pose: RigidTransform, data: Correspondences, pattern_bearings: Bearings, noise_angle: float
 ) -> tuple[RigidTransform, float]:
     """Return the pose with the sign of t that puts most points in front, and the share that is."""
-    sign = in_front(pose, seen, residuals(pose, data.rays, seen), noise_angle)
+    sign = in_front(
+        pose, pattern_bearings, residuals(pose, data.rays, pattern_bearings), noise_angle
+    )
     reverse = RigidTransform(pose.R, -pose.t)
-    sign_reverse = in_front(reverse, seen, residuals(reverse, data.rays, seen), noise_angle)
+    sign_reverse = in_front(
+        reverse, pattern_bearings, residuals(reverse, data.rays, pattern_bearings), noise_angle
+    )
     if (sign_reverse < 0).sum() < (sign < 0).sum():
         pose, sign = reverse, sign_reverse
     return pose, 1 - float((sign < 0).mean())
 
 
 def _at_focal(data: Correspondences, projector: ProjectorModel) -> list[Proposal]:
-    seen = bearings(projector, data.q)
+    pattern_bearings = bearings(projector, data.q)
     threshold = THRESHOLD_PX / projector.focal
     return [
-        _scored(pose, data, projector, seen)
+        _scored(pose, data, projector, pattern_bearings)
         for pose in [
-            *_five_point_poses(data, seen, threshold),
-            *planar_poses(data, seen, 4 * threshold),
+            *_five_point_poses(data, pattern_bearings, threshold),
+            *planar_poses(data, pattern_bearings, 4 * threshold),
         ]
     ]
 
 
 def _five_point_poses(
-    data: Correspondences, seen: Bearings, threshold: float
+    data: Correspondences, pattern_bearings: Bearings, threshold: float
 ) -> Iterator[RigidTransform]:
-    pairs = _on_unit_plane(data, seen)
+    pairs = _on_unit_plane(data, pattern_bearings)
     if pairs is None:
         return
     E, _ = cv2.findEssentialMat(
@@ -192,25 +198,30 @@ def _five_point_poses(
         yield _unit(second, t)
 
 
-def _on_unit_plane(data: Correspondences, seen: Bearings) -> tuple[Vectors, Vectors] | None:
+def _on_unit_plane(
+    data: Correspondences, pattern_bearings: Bearings
+) -> tuple[Vectors, Vectors] | None:
     """Return ray and bearing pairs on the planes z = 1, or None where too few have z > 0."""
     with np.errstate(invalid="ignore"):
-        z = seen.b[2] / np.sqrt((seen.b * seen.b).sum(0))
+        z = pattern_bearings.b[2] / np.sqrt((pattern_bearings.b * pattern_bearings.b).sum(0))
         usable = (data.rays[2] > _MIN_Z) & (z > _MIN_Z)
     if usable.sum() < max(8, 0.5 * len(data)):
         return None
-    rays, b = data.rays[:, usable], seen.b[:, usable]
+    rays, b = data.rays[:, usable], pattern_bearings.b[:, usable]
     return (
         np.ascontiguousarray((rays[:2] / rays[2]).T), np.ascontiguousarray((b[:2] / b[2]).T)
     )  # fmt: skip
 
 
 def _scored(
-    pose: RigidTransform, data: Correspondences, projector: ProjectorModel, seen: Bearings
+    pose: RigidTransform,
+    data: Correspondences,
+    projector: ProjectorModel,
+    pattern_bearings: Bearings,
 ) -> Proposal:
-    pose, front = facing(pose, data, seen, THRESHOLD_PX / projector.focal)
+    pose, front = facing(pose, data, pattern_bearings, THRESHOLD_PX / projector.focal)
     fit = EpipolarLoss(redescending=False, scale=SCORE_PX).cost(
-        evaluate(pose, projector, data, seen).r
+        evaluate(pose, projector, data, pattern_bearings).r
     )
     return Proposal(pose, projector.focal, fit + SCORE_PX**2 * (1 - front))
 

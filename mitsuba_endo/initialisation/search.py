@@ -82,15 +82,15 @@ def search_start(
     minima = refine(problem, ((p.pose, p.focal) for p in proposals), some)
     minima = finish(problem, minima, some, many) if minima else []
     _check_found(minima, size)
-    found = minima[0].state
+    best = minima[0].state
     shape = (camera.height, camera.width)
-    seen = depth_image(evaluate(found.pose, found.projector, data), data, shape)
+    image = depth_image(evaluate(best.pose, best.projector, data), data, shape)
     return Start(
-        projector=found.projector,
-        projector_from_camera=found.pose,
-        depth=seen.depth,
-        used=seen.used,
-        scale_px=robust_scale(found),
+        projector=best.projector,
+        projector_from_camera=best.pose,
+        depth=image.depth,
+        used=image.used,
+        scale_px=robust_scale(best),
         noise_px=noise,
         notes=remarks(minima, many, refine_focal),
         alternatives=[m.candidate for m in minima[1:]],

@@ -65,11 +65,11 @@ def design_effect(
     """
     w = usable_weights(residuals, weights)
     a = w[..., None] * np.where(w[..., None] > 0, residuals, 0.0)
-    sums, squares, seen = (_integral(v) for v in (a, a * a, (w > 0)[..., None].astype(float)))
+    sums, squares, counts = (_integral(v) for v in (a, a * a, (w > 0)[..., None].astype(float)))
     rows: list[tuple[int, NDArray[np.float64], float]] = []
     for length in _lengths(max(w.shape)):
         area = float(min(length, w.shape[0]) * min(length, w.shape[1]))
-        filled = _block_sums(seen, length)[:, 0] >= MIN_FILLED * area
+        filled = _block_sums(counts, length)[:, 0] >= MIN_FILLED * area
         if filled.any():
             pair = _block_sums(sums, length)[filled], _block_sums(squares, length)[filled]
             rows.append((length, _ratio(*pair), max((w > 0).sum() / area, 1.0)))

@@ -44,8 +44,10 @@ def _ranges(
     out = np.full(map_.valid.shape, np.nan)
     rays = camera.grid_rays
     use = map_.valid & np.isfinite(rays).all(-1)
-    seen = bearings(projector, map_.q[use].astype(np.float64).T)
-    found = ranges(pose, seen, residuals(pose, rays[use].T, seen))
-    front = np.isfinite(found[0]) & (found[0] > 0) & (found[1] > 0)
-    out[use] = np.where(front, found[0], np.nan)
+    pattern_bearings = bearings(projector, map_.q[use].astype(np.float64).T)
+    from_camera, from_projector, _ = ranges(
+        pose, pattern_bearings, residuals(pose, rays[use].T, pattern_bearings)
+    )
+    front = np.isfinite(from_camera) & (from_camera > 0) & (from_projector > 0)
+    out[use] = np.where(front, from_camera, np.nan)
     return smooth_depth(out)

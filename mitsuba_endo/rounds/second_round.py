@@ -15,6 +15,7 @@ from ..refine.pattern_image import PatternImage
 from ..refine.refine_map import RefinedMap
 from ..refine.scene_round import refine_against_scene
 from ..solve.calibrate import calibrate
+from ..solve.minimisers.minimise import Progress
 from ..solve.options import Options
 from .known_geometry import known_geometry
 
@@ -25,7 +26,6 @@ READING = 0.1
 """Share of the second round's progress that goes by before it solves."""
 Picture = NDArray[np.integer] | NDArray[np.floating]
 """(H, W) or (H, W, 3), 8 or 16 bit, or floats where 1 is full scale."""
-Say = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def read_again(
     maps: Sequence[CorrespondenceMap],
     pictures: Iterable[tuple[str, Picture]],
     pattern: PatternImage,
-    say: Say = lambda share, step: None,
+    progress: Progress = lambda share, step: None,
 ) -> SecondRound:
     """Read photographs with the geometry of a calibration from their first maps.
 
@@ -78,7 +78,7 @@ def read_again(
         maps: refined on their images.
         pictures: of frames, by the maps' names; others are passed over.
         pattern: that was projected.
-        say: called with the share of the work done and the name of the step.
+        progress: called with the share of the work done and the name of the step.
 
     Raises:
         InputError: a picture of another size than its map.
@@ -87,7 +87,7 @@ def read_again(
     named = {m.name: m for m in maps}
     if first.solution.outcome is Outcome.CONVERGED:
         for k, (name, picture) in enumerate(pictures):
-            say(k / max(len(named), 1), f"Reading {name} again")
+            progress(k / max(len(named), 1), f"Reading {name} again")
             map_ = named.get(name)
             geometry = map_ and known_geometry(first.solution, first.camera, map_)
             if map_ and geometry and np.isfinite(geometry.range).any():
@@ -105,7 +105,7 @@ def second_round(
     options: Options | None = None,
     *,
     masked: Callable[[CorrespondenceMap], CorrespondenceMap] = lambda map_: map_,
-    say: Say = lambda share, step: None,
+    progress: Progress = lambda share, step: None,
     observe: Observe | None = None,
 ) -> tuple[SecondRound, Calibration]:
     """Read photographs again and calibrate again where that changed enough.
@@ -118,7 +118,7 @@ def second_round(
         rig: what is known.
         options: how to solve.
         masked: takes away pixels that are not to be used.
-        say: called with the share of the work done and the name of the step.
+        progress: called with the share of the work done and the name of the step.
         observe: as for :func:`..solve.calibrate.calibrate`.
 
     Returns:
@@ -129,14 +129,14 @@ def second_round(
         InputError: a picture of another size than its map.
     """
     read = read_again(
-        first, maps, pictures, pattern, lambda share, step: say(READING * share, step)
+        first, maps, pictures, pattern, lambda share, step: progress(READING * share, step)
     )
     read = replace(read, maps=[masked(m) for m in read.maps])
     if not read.worth_solving:
         return read, first
 
     def solving(share: float, step: str) -> None:
-        say(READING + (1 - READING) * share, f"Second round: {step[:1].lower()}{step[1:]}")
+        progress(READING + (1 - READING) * share, f"Second round: {step[:1].lower()}{step[1:]}")
 
     solved = calibrate(read.maps, rig, options, solving, None, observe)
     good = solved.solution.outcome in (Outcome.CONVERGED, Outcome.INTERRUPTED)

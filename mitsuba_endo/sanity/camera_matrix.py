@@ -85,10 +85,11 @@ def principal_point(_maps: Sequence[CorrespondenceMap], rig: Rig) -> list[Findin
             f"{size}: another resolution, or a crop",
         )]  # fmt: skip
     if off > 0.5 - NEAR_BORDER:
-        place = "beyond" if off > 0.5 else "near"
+        relation = "beyond" if off > 0.5 else "near"
         return [_finding(
             "principal_point",
-            f"{at} lies {place} the border of {size}: a crop, another resolution or mixed entries",
+            f"{at} lies {relation} the border of {size}: a crop, another resolution or mixed "
+            "entries",
         )]  # fmt: skip
     if off > FAR_FROM_MIDDLE:
         return [_finding("camera_crop", f"{at} lies far from the middle of {size}, as of a crop")]

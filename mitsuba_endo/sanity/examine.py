@@ -63,11 +63,13 @@ def examine(maps: Sequence[CorrespondenceMap], rig: Rig) -> Examined:
         check_maps(examined.maps, rig)
     for check in CHECKS:
         with examined.told_on_failure():
-            found = check(examined.maps, rig)
-            for finding in found:
+            of_check = check(examined.maps, rig)
+            for finding in of_check:
                 if finding.refused:
                     raise finding.error
-        examined = Examined(without_unusable(examined.maps, found), [*examined.findings, *found])
+        examined = Examined(
+            without_unusable(examined.maps, of_check), [*examined.findings, *of_check]
+        )
     return examined
 
 

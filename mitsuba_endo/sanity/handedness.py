@@ -105,8 +105,10 @@ def local_jacobians(map_: CorrespondenceMap) -> NDArray[np.float64]:
     side = max(CELL_PX, int(np.ceil(np.sqrt(16 / density))))
     side = max(2, min(side, height // 4, width // 4))
     y, x = np.mgrid[:height, :width].astype(np.float32)
-    known = np.where(valid[..., None], np.concatenate([map_.q, np.stack([x, y], -1)], -1), np.nan)
-    cells = _cell_medians(known, side)
+    q_and_pixel = np.where(
+        valid[..., None], np.concatenate([map_.q, np.stack([x, y], -1)], -1), np.nan
+    )
+    cells = _cell_medians(q_and_pixel, side)
     right, below = cells[:-1, 1:] - cells[:-1, :-1], cells[1:, :-1] - cells[:-1, :-1]
     steps = np.stack([right, below], -1)
     steps = steps[np.isfinite(steps).all((-1, -2))].astype(np.float64)

@@ -23,14 +23,14 @@ def lens_fold(maps: Sequence[CorrespondenceMap], rig: Rig) -> list[Finding]:
     if not lost:
         return []
     most = max(lost, key=lambda k: lost[k].sum())
-    count, known = int(lost[most].sum()), int(maps[most].valid.sum())
+    count, total = int(lost[most].sum()), int(maps[most].valid.sum())
     return [Finding(
         "lens_fold",
-        f"the coefficients fold back inside the image: {count} of {known} correspondences "
-        f"({100 * count / known:.2g} %) lie beyond the fold and are left out, and those near it "
+        f"the coefficients fold back inside the image: {count} of {total} correspondences "
+        f"({100 * count / total:.2g} %) lie beyond the fold and are left out, and those near it "
         "are doubtful",
         "camera.distortion",
         "calibrate the camera with views up to the corners, or as opencv_fisheye",
-        refused=count > MAX_FOLDED * known,
+        refused=count > MAX_FOLDED * total,
         unusable=lost,
     )]  # fmt: skip

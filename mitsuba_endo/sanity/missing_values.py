@@ -35,25 +35,25 @@ def missing_values(maps: Sequence[CorrespondenceMap]) -> list[Finding]:
 
     They are left out. This runs before the other checks, which would take them for outliers.
     """
-    found: dict[str, dict[int, NDArray[np.bool_]]] = {}
+    by_text: dict[str, dict[int, NDArray[np.bool_]]] = {}
     for k, map_ in enumerate(maps):
         for repeated in repeated_values(map_):
-            found.setdefault(repeated.text, {})[k] = repeated.pixels
-    return [_finding(text, hits, maps) for text, hits in found.items()]
+            by_text.setdefault(repeated.text, {})[k] = repeated.pixels
+    return [_finding(text, hits, maps) for text, hits in by_text.items()]
 
 
 def repeated_values(map_: CorrespondenceMap) -> list[Repeated]:
     """Return the values, of both coordinates together or of one, that stand for missing."""
-    found: list[Repeated] = []
+    repeats: list[Repeated] = []
     left = map_.valid
     for text, pixels in _repeated(map_.q, left, MIN_SHARE):
-        found.append(Repeated(text, pixels))
+        repeats.append(Repeated(text, pixels))
         left = left & ~pixels
     for axis, name in enumerate("xy"):
         for text, pixels in _repeated(map_.q[..., axis : axis + 1], left, MIN_COMPONENT_SHARE):
-            found.append(Repeated(f"{name} = {text}", pixels))
+            repeats.append(Repeated(f"{name} = {text}", pixels))
             left = left & ~pixels
-    return found
+    return repeats
 
 
 def _repeated(

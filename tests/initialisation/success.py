@@ -32,7 +32,7 @@ def limits(rig: Rig, inliers: float) -> tuple[float, float]:
     truth = rig.projector_from_camera
     state = evaluate(RigidTransform(truth.R, truth.t / rig.baseline), rig.projector, data)
     J: NDArray[np.float64] = jacobian(
-        state.pose, state.projector, data.rays, data.q, state.seen, state.at, True
+        state.pose, state.projector, data.rays, data.q, state.bearings, state.at, True
     )
     covariance = np.linalg.inv(J @ J.T * (inliers / len(data))) * NOISE**2
     return float(np.sqrt(covariance[5, 5])), float(np.sqrt(covariance[3, 3] + covariance[4, 4]))

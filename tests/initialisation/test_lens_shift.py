@@ -39,7 +39,7 @@ def test_finds_a_shifted_centre(height: float):
     """Oracle: the rig's centre and focal length; noise 0.3 px and 10 % outliers allow 6 px, 1 %."""
     rig = _rig(height)
     shift = _found(rig)
-    assert shift.found
+    assert shift.off_middle
     assert shift.centre[0] == MIDDLE[0]
     assert shift.centre[1] == pytest.approx(rig.projector.centre[1], abs=6)
     assert shift.states[0].projector.focal == pytest.approx(600, rel=0.01)
@@ -48,7 +48,7 @@ def test_finds_a_shifted_centre(height: float):
 def test_keeps_the_middle_where_it_is_right():
     """Oracle: at the rig's own centre nothing else is clearly better."""
     shift = _found(_rig(0.5))
-    assert not shift.found
+    assert not shift.off_middle
     assert shift.centre == MIDDLE
 
 
@@ -58,7 +58,7 @@ def test_frames_that_share_a_centre():
     for seed, rig in enumerate((_rig(1.07), rigs.with_noise(_rig(1.07), 0.2, 5))):
         frames.append(frame_samples(rig.q, rig.camera, np.random.default_rng(seed)))
     shift = find_lens_shift(frames, rig.unknown_projector, SIZE)
-    assert shift.found
+    assert shift.off_middle
     assert shift.centre[1] == pytest.approx(rig.projector.centre[1], abs=6)
     assert shift.scale_px < 0.95 * shift.middle_scale_px
 

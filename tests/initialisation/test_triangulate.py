@@ -23,7 +23,7 @@ def _state(rig, pose):
 def test_ranges_are_those_of_the_cast_rays(rig):
     """Oracle: the ranges at which the rays met the surface, and their distance to the projector."""
     data, state = _state(rig, rig.projector_from_camera)
-    camera, projector, _ = ranges(state.pose, state.seen, state.at)
+    camera, projector, _ = ranges(state.pose, state.bearings, state.at)
     depth = rig.depth.flat[data.pixel]
     np.testing.assert_allclose(camera, depth, rtol=1e-8)
     points = rig.projector_from_camera.apply((depth * data.rays).T)
@@ -34,15 +34,15 @@ def test_a_reversed_translation_puts_everything_behind(rig):
     """Oracle: negating t negates every depth."""
     pose = rig.projector_from_camera
     _, state = _state(rig, RigidTransform(pose.R, -pose.t))
-    assert (in_front(state.pose, state.seen, state.at, 1e-6) == -1).mean() > 0.999
-    assert (in_front(state.pose, state.seen, state.at, 4.0) == 0).all()
+    assert (in_front(state.pose, state.bearings, state.at, 1e-6) == -1).mean() > 0.999
+    assert (in_front(state.pose, state.bearings, state.at, 4.0) == 0).all()
 
 
 def test_smoothing_reduces_noise_and_keeps_gaps(rig):
     """Oracle: the exact depth; the median of 25 has a third of the noise away from the rim."""
     data, state = _state(with_noise(rig, 0.3, 0), rig.projector_from_camera)
     noisy = np.full(rig.depth.shape, np.nan)
-    noisy.flat[data.pixel] = ranges(state.pose, state.seen, state.at)[0]
+    noisy.flat[data.pixel] = ranges(state.pose, state.bearings, state.at)[0]
     smooth = smooth_depth(noisy)
     np.testing.assert_array_equal(np.isnan(smooth), np.isnan(noisy))
     before, after = (np.nanmedian(np.abs(d / rig.depth - 1)) for d in (noisy, smooth))

@@ -92,7 +92,7 @@ def searched_centre(
         frames, projector.to_model(Pinhole.name), (projector.width, projector.height),
         refine_focal=layout.free["focal"], focal_guess=projector.focal.value,
     )  # fmt: skip
-    if not shift.found:
+    if not shift.off_middle:
         return rig, assumed, starts
     moved = _with_centre(rig, list(shift.centre))
     return moved, found_note(shift, refined=moved.share.centre != "fixed"), {}
