@@ -53,7 +53,7 @@ def calibrate(
         InputError: maps or rig that cannot be used; says what to do.
     """
     options = options or Options()
-    say = progress or (lambda _share, _step: None)
+    report = progress or (lambda _share, _step: None)
     minimiser_of(options)  # an unknown one is told before any work
     examined = examine(as_maps(maps), rig)
     check_surface(options, rig, len(examined.maps), resume)
@@ -64,8 +64,8 @@ def calibrate(
         weighted, laws = balanced(examined.maps), _laws(rig, resume)
         jobs = [Job(weighted, camera, rig, law, options, resume, history=History(observe))
                 for law in laws]  # fmt: skip
-        fits = solve_each(jobs, say)
-        say(0.9, "Assembling the solution")
+        fits = solve_each(jobs, report)
+        report(0.9, "Assembling the solution")
         fit, evidence, warnings = choose_law(fits)
         warnings = [*unused_deviations(rig, fit.result.problem.layout, options), *warnings]
         return assemble(fit, camera, rig, options, evidence, [*examined.warnings, *warnings])
@@ -78,7 +78,7 @@ def _laws(rig: Rig, resume: Checkpoint | None) -> list[str]:
     return list(PROJECTION_MODELS) if rig.projector.law == AUTO_LAW else [rig.projector.law]
 
 
-def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:
+def solve_each(jobs: Sequence[Job], progress: Progress) -> list[Fit]:
     """Solve the same maps under each projection model, and from where the others ended too.
 
     A model is compared at its best: where the data say little, its own start may lie in a valley
@@ -88,28 +88,28 @@ def solve_each(jobs: Sequence[Job], say: Progress) -> list[Fit]:
         One fit a model; the interrupted one alone where the user stopped.
     """
     parts = 2 * len(jobs) if len(jobs) > 1 else 1  # an only one has no others to start from
-    last = _part(say, parts, parts)
-    end = _part(stopping(say), parts, parts)
-    jobs = [with_centre(job, _part(say, i, parts)) for i, job in enumerate(jobs)]
+    last = _part(progress, parts, parts)
+    end = _part(stopping(progress), parts, parts)
+    jobs = [with_centre(job, _part(progress, i, parts)) for i, job in enumerate(jobs)]
     done: list[Optimised] = []
     for i, job in enumerate(jobs):
-        done.append(optimise(job, _part(say, i, parts)))
+        done.append(optimise(job, _part(progress, i, parts)))
         if done[-1].result.outcome is Outcome.INTERRUPTED:
             return [infer(job, done[-1], end)]
     for i, job in enumerate(jobs):
-        done[i] = _from_others(job, i, done, _part(say, len(jobs) + i, parts))
+        done[i] = _from_others(job, i, done, _part(progress, len(jobs) + i, parts))
         if done[i].result.outcome is Outcome.INTERRUPTED:
             return [infer(job, done[i], end)]
     return [infer(job, d, last) for job, d in zip(jobs, done, strict=True)]
 
 
-def _from_others(job: Job, index: int, done: Sequence[Optimised], say: Progress) -> Optimised:
+def _from_others(job: Job, index: int, done: Sequence[Optimised], progress: Progress) -> Optimised:
     """Return the better of where a model ended by itself and from where the others ended."""
     best = own = done[index]
     for other in (d for k, d in enumerate(done) if k != index):
         if [m.name for m in other.maps] != [m.name for m in own.maps]:
             continue
-        result = optimise_again(job, other.result, say)
+        result = optimise_again(job, other.result, progress)
         if result.outcome is Outcome.INTERRUPTED:
             return replace(best, result=replace(best.result, outcome=Outcome.INTERRUPTED))
         if cheaper(result, best.result):
@@ -117,6 +117,6 @@ def _from_others(job: Job, index: int, done: Sequence[Optimised], say: Progress)
     return best
 
 
-def _part(say: Progress, index: int, parts: int) -> Progress:
+def _part(progress: Progress, index: int, parts: int) -> Progress:
     """Return a progress callback that fills one part of the first nine tenths."""
-    return lambda share, step: say(0.9 * min(index + share, parts) / parts, step)
+    return lambda share, step: progress(0.9 * min(index + share, parts) / parts, step)

@@ -68,11 +68,11 @@ class Optimised:
     """Why the sharing plan is wrong, where most frames contradict it."""
 
 
-def with_centre(job: Job, say: Progress) -> Job:
+def with_centre(job: Job, progress: Progress) -> Job:
     """Return the job with the projector's centre looked for, where a lens has none given."""
     if not centre_is_assumed(job.rig, job.law):
         return job
-    say(0.0, "Looking for the projector's centre")
+    progress(0.0, "Looking for the projector's centre")
     with job.timed("start"):
         if job.resume is not None:
             (rig, note), starts = resumed_centre(job.resume, job.rig), {}

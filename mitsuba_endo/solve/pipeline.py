@@ -40,7 +40,7 @@ _MAX_EXTENSIONS = 10
 """Times that the surface may grow while cameras that started at one place spread."""
 
 
-def optimise(job: Job, say: Progress) -> Optimised:
+def optimise(job: Job, progress: Progress) -> Optimised:
     """Search for a start and optimise.
 
     Raises:
@@ -48,13 +48,13 @@ def optimise(job: Job, say: Progress) -> Optimised:
     """
     job.layout(len(job.maps))  # a contradiction is told before any work
     if job.resume is not None:
-        return _resumed(job, job.resume, say)
+        return _resumed(job, job.resume, progress)
     if len(job.maps) > 1 and job.rig.share.surface == "shared":
-        return _shared_surface(job, say)
-    return _own_surfaces(job, say)
+        return _shared_surface(job, progress)
+    return _own_surfaces(job, progress)
 
 
-def optimise_again(job: Job, other: OptimisationResult, say: Progress) -> OptimisationResult:
+def optimise_again(job: Job, other: OptimisationResult, progress: Progress) -> OptimisationResult:
     """Optimise under the job's projection model from where another model's result ended.
 
     The unknowns are the job's own: what another model needed as one, such as a lens's centre that
@@ -69,18 +69,18 @@ def optimise_again(job: Job, other: OptimisationResult, say: Progress) -> Optimi
     terms = [*old.smoothness, *priors_of(job.rig, layout)]
     problem = make_problem(old.observed, old.surfaces, state, layout, job.law, terms)
     aside = replace(job, history=History())  # what is kept is how the model's own way went
-    return _optimise(aside, problem, state, _reporter(job, say, 0.1))[0]
+    return _optimise(aside, problem, state, _reporter(job, progress, 0.1))[0]
 
 
-def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Optimised:
+def _resumed(job: Job, checkpoint: Checkpoint, progress: Progress) -> Optimised:
     maps = resumed_maps(checkpoint, job.maps)
-    say(0.1, "Optimising")
+    progress(0.1, "Optimising")
     with job.timed("optimise"):
         problem, state = resumed_problem(
             checkpoint, maps, job.camera, job.rig, job.layout(len(maps))
         )
         result, predicted = _optimise(
-            job, problem, state, _reporter(job, say, 0.1), last_stage=checkpoint.last_stage
+            job, problem, state, _reporter(job, progress, 0.1), last_stage=checkpoint.last_stage
         )
     left_out = [
         LeftOut(name=m.name, reason="it was not part of the calibration resumed")
@@ -90,15 +90,17 @@ def _resumed(job: Job, checkpoint: Checkpoint, say: Progress) -> Optimised:
     return Optimised(maps, left_out, [], result, predicted)
 
 
-def _own_surfaces(job: Job, say: Progress) -> Optimised:
-    say(0.05, "Searching for a start")
+def _own_surfaces(job: Job, progress: Progress) -> Optimised:
+    progress(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = _starts(job, _frames_of(say, 0.05, 0.4, "Searching for a start"))
+        maps, starts, left_out = _starts(
+            job, _frames_of(progress, 0.05, 0.4, "Searching for a start")
+        )
         layout = job.layout(len(maps))
         if len(maps) > 1 and layout.sharing("projector_pose") != "per_frame":
             share_focal = layout.sharing("focal") != "per_frame"
             starts = common_start(maps, starts, job.camera, share_focal=share_focal)
-    say(0.4, "Optimising")
+    progress(0.4, "Optimising")
     notes = list(dict.fromkeys(note for s in starts for note in s.notes))
     with job.timed("optimise"):
         predicted: list[Direction] = []
@@ -107,22 +109,22 @@ def _own_surfaces(job: Job, say: Progress) -> Optimised:
             problem, state = separate_surfaces(
                 maps, starts, job.camera, job.rig, layout, job.law, job.options
             )
-            result, predicted[:] = _optimise(job, problem, state, _reporter(job, say, 0.4))
+            result, predicted[:] = _optimise(job, problem, state, _reporter(job, progress, 0.4))
             return result
 
         result = with_restarts(maps, starts, job.camera, solve)
     return Optimised(maps, left_out, notes, result, predicted)
 
 
-def _shared_surface(job: Job, say: Progress) -> Optimised:
+def _shared_surface(job: Job, progress: Progress) -> Optimised:
     """Solve every frame alone, register them, and optimise all with one surface.
 
     Where the user stops while frames are solved alone, those that are done are brought together.
     """
-    alone, left_out = _solved_alone(job, say)
+    alone, left_out = _solved_alone(job, progress)
     stopped = any(left.reason == NOT_REACHED for left in left_out)
-    say = stopping(say) if stopped else say
-    say(0.5, "Registering the frames")
+    progress = stopping(progress) if stopped else progress
+    progress(0.5, "Registering the frames")
     with job.timed("registration"):
         registered = _register(job, alone)
     kept = [k for k, p in enumerate(registered) if p.reliable]
@@ -132,22 +134,24 @@ def _shared_surface(job: Job, say: Progress) -> Optimised:
         if not p.reliable
     ]
     notes = list(dict.fromkeys(note for k in kept for note in alone[k].notes))
-    say(0.6, "Optimising all frames")
+    progress(0.6, "Optimising all frames")
     with job.timed("optimise"):
-        report = _stop if stopped else _reporter(job, say, 0.6)
+        report = _stop if stopped else _reporter(job, progress, 0.6)
         done = _optimise_joint(job, [alone[k] for k in kept], [registered[k] for k in kept], report)
     return replace(done, left_out=left_out + done.left_out, notes=notes + done.notes)
 
 
-def _solved_alone(job: Job, say: Progress) -> tuple[list[FrameSolution], list[LeftOut]]:
+def _solved_alone(job: Job, progress: Progress) -> tuple[list[FrameSolution], list[LeftOut]]:
     """Start and solve every frame alone; name those that cannot be used."""
-    say(0.05, "Searching for a start")
+    progress(0.05, "Searching for a start")
     with job.timed("start"):
-        maps, starts, left_out = _starts(job, _frames_of(say, 0.05, 0.3, "Searching for a start"))
-    say(0.3, "Solving every frame alone")
+        maps, starts, left_out = _starts(
+            job, _frames_of(progress, 0.05, 0.3, "Searching for a start")
+        )
+    progress(0.3, "Solving every frame alone")
     with job.timed("frames"):
         layout = job.layout(len(maps))
-        told = _frames_of(say, 0.3, 0.5, "Solving every frame alone")
+        told = _frames_of(progress, 0.3, 0.5, "Solving every frame alone")
         alone = solve_alone(maps, starts, job.camera, job.rig, layout, job.law, job.options, told)
     missing = [LeftOut(name=m.name, reason=NOT_REACHED) for m in maps[len(alone) :]]
     return alone, [*left_out, *missing]
@@ -158,12 +162,12 @@ def _stop(_row: TraceRow, _state: State) -> None:
     raise KeyboardInterrupt
 
 
-def _frames_of(say: Progress, begin: float, end: float, step: str) -> OnFrame:
+def _frames_of(progress: Progress, begin: float, end: float, step: str) -> OnFrame:
     """Return a callback that tells the frames of a step, of a part of the progress bar."""
 
     def told(frame: int, count: int) -> None:
         of = f", frame {frame} of {count}" if count > 1 else ""
-        say(begin + (end - begin) * (frame - 1) / count, f"{step}{of}")
+        progress(begin + (end - begin) * (frame - 1) / count, f"{step}{of}")
 
     return told
 
@@ -269,12 +273,12 @@ def _continued(before: list[TraceRow], after: list[TraceRow]) -> list[TraceRow]:
     ]
 
 
-def _reporter(job: Job, say: Progress, begin: float) -> OnIteration:
+def _reporter(job: Job, progress: Progress, begin: float) -> OnIteration:
     """Return a callback that shows the iterations in the rest of the progress bar."""
 
     def report(row: TraceRow, _state: State) -> None:
         share = min(row.iteration / job.options.max_iterations, 1.0)
         focal = f", f = {row.focal:.2f} px" if row.focal is not None else ""
-        say(begin + (1 - begin) * share, f"Optimising (iteration {row.iteration}{focal})")
+        progress(begin + (1 - begin) * share, f"Optimising (iteration {row.iteration}{focal})")
 
     return report

@@ -118,9 +118,9 @@ class CoordinateTerm(Term):
         return self.renderer.surface
 
     def evaluate(self, state: State) -> FrameResiduals:
-        seen = self.renderer.render(state)
-        residual = np.where(seen.hit, self.observed.whitened(seen.q - self.observed.q), 0.0)
-        return FrameResiduals(state, seen.hit, seen.faces, seen.distance, residual)
+        rendered = self.renderer.render(state)
+        residual = np.where(rendered.hit, self.observed.whitened(rendered.q - self.observed.q), 0.0)
+        return FrameResiduals(state, rendered.hit, rendered.faces, rendered.distance, residual)
 
     def linearise(self, at: FrameResiduals) -> Linearisation:
         """Return the whitened derivatives."""

@@ -167,10 +167,10 @@ class FrameRenderer:
         columns = [dr.grad(tangent) for tangent in tangents]
         dr.eval(columns, t.faces)
         # Summed afterwards: ten times faster than adding all pixels to one number in the kernel.
-        faces, seen = self.scene.surface.faces, t.faces.numpy()
+        faces, hit_faces = self.scene.surface.faces, t.faces.numpy()
         of_surface = np.zeros(self.scene.surface.size)
         for i, column in enumerate(columns[:3]):
-            of_face = np.bincount(seen, column.numpy(), len(faces))
+            of_face = np.bincount(hit_faces, column.numpy(), len(faces))
             of_surface += np.bincount(faces[:, i], of_face, len(of_surface))
         return of_surface, np.array([column.numpy().sum() for column in columns[3:]])
 

@@ -47,8 +47,8 @@ def edge_lengths(
     in_cell = float(np.median([f.observations.count / len(f.points) for f in frames]))
     sigma = float(np.median([robust_noise(f.squared) for f in frames]))
     spacing = cell * distances
-    seen = in_cell * np.maximum(fine.frames, 1) / spacing**2  # observations per area
-    of_area = sigma * distances**2 / disparity / np.sqrt(seen)
+    density = in_cell * np.maximum(fine.frames, 1) / spacing**2  # observations per area
+    of_area = sigma * distances**2 / disparity / np.sqrt(density)
     bent = curvatures(fine.vertices, fine.faces, fine.normals, _ROUNDS)
     edge = np.cbrt(8 * _SAGITTA * of_area / np.maximum(bent, 1e-300))
     edge = np.clip(edge, _FINEST * spacing, _COARSEST * spacing)

@@ -66,7 +66,7 @@ def usable_starts(
     layout: Layout,
     law: str,
     options: Options,
-    known: Mapping[str, Start],
+    given: Mapping[str, Start],
     on_frame: OnFrame | None = None,
 ) -> tuple[list[CorrespondenceMap], list[Start], list[LeftOut]]:
     """Start every frame; frames without a start are left out by name.
@@ -78,7 +78,7 @@ def usable_starts(
         layout: of the unknowns.
         law: the projection model.
         options: how to solve.
-        known: starts of some frames, by name, that need not be searched for again.
+        given: starts of some frames, by name, that need not be searched for again.
         on_frame: called with the number of each, from 1, and how many there are.
 
     Raises:
@@ -90,7 +90,7 @@ def usable_starts(
         if on_frame is not None:
             on_frame(k, len(maps))
         try:
-            start = known.get(map_.name)
+            start = given.get(map_.name)
             starts.append(start or start_frame(map_, camera, rig, layout, law, options))
             kept.append(map_)
         except InputError as error:
@@ -117,11 +117,11 @@ def without_repeats(
     kept: list[CorrespondenceMap] = []
     left_out = []
     for map_ in maps:
-        twin = next((k for k in kept if np.array_equal(k.q, map_.q, equal_nan=True)), None)
-        if twin is None:
+        original = next((k for k in kept if np.array_equal(k.q, map_.q, equal_nan=True)), None)
+        if original is None:
             kept.append(map_)
         else:
-            left_out.append(LeftOut(name=map_.name, reason=f"it is a copy of {twin.name}"))
+            left_out.append(LeftOut(name=map_.name, reason=f"it is a copy of {original.name}"))
     return kept, left_out
 
 
@@ -156,8 +156,10 @@ def common_start(
         except InputError:
             continue
         # A pose that leaves most points behind a device is no candidate, however well it fits.
-        seen = min(t.used.sum() / max(s.used.sum(), 1) for t, s in zip(trial, starts, strict=True))
-        scale = float(np.median([t.scale_px for t in trial])) / max(float(seen), 1e-3)
+        kept_share = min(
+            t.used.sum() / max(s.used.sum(), 1) for t, s in zip(trial, starts, strict=True)
+        )
+        scale = float(np.median([t.scale_px for t in trial])) / max(float(kept_share), 1e-3)
         if scale < lowest:
             best, lowest = trial, scale
     return best or list(starts)

@@ -39,9 +39,9 @@ def whitening(map_: CorrespondenceMap, used: NDArray[np.bool_]) -> NDArray[np.fl
         return None if map_.weight is None else np.sqrt(map_.weight[used].astype(np.float64))
     xx, xy, yy = map_.covariance[used].T.astype(np.float64)
     mean = (xx + yy) / 2
-    known = np.isfinite(mean + xy)
+    finite = np.isfinite(mean + xy)
     xx, xy, yy = (
-        np.where(known, part / mean, alike) for part, alike in ((xx, 1.0), (xy, 0.0), (yy, 1.0))
+        np.where(finite, part / mean, alike) for part, alike in ((xx, 1.0), (xy, 0.0), (yy, 1.0))
     )
     root = np.sqrt(np.maximum(xx, THINNEST))
     lower = np.sqrt(np.maximum(yy - (xy / root) ** 2, THINNEST))
@@ -94,9 +94,9 @@ def initial_rho(
     vertex, first, count = np.unique(at, return_index=True, return_counts=True)
     rho = np.zeros(lattice.size)
     rho[vertex] = value[first + count // 2]
-    seen = np.zeros(lattice.size, bool)
-    seen[vertex] = True
-    return lattice.fill(seen, rho)
+    covered = np.zeros(lattice.size, bool)
+    covered[vertex] = True
+    return lattice.fill(covered, rho)
 
 
 def smooth_samples(

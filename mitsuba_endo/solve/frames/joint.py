@@ -87,9 +87,9 @@ def _cell(frames: Sequence[FrameSolution], registered: Sequence[Registration]) -
     What a cell of that frame spans is seen under a smaller angle from the first camera.
     """
     ratios = [1.0]
-    for frame, place in zip(frames, registered, strict=True):
-        near = place.scale * frame.points
-        far = place.world_from_camera.apply(near)
+    for frame, registration in zip(frames, registered, strict=True):
+        near = registration.scale * frame.points
+        far = registration.world_from_camera.apply(near)
         ratios.append(float(np.median(np.linalg.norm(near, axis=1) / np.linalg.norm(far, axis=1))))
     return frames[0].cell * max(min(ratios), FINEST)
 
@@ -109,9 +109,9 @@ def extended(result: OptimisationResult) -> tuple[Problem, State] | None:
     directions = points / np.linalg.norm(points, axis=1, keepdims=True)
     grown = lattice_over(directions, lattice.cell, 1)
     at = grown.nearest(lattice.directions)
-    rho, seen = np.zeros(grown.size), np.zeros(grown.size, bool)
-    rho[at], seen[at] = state.surfaces[0], True
-    state = state.with_surfaces(grown.fill(seen, rho))
+    rho, covered = np.zeros(grown.size), np.zeros(grown.size, bool)
+    rho[at], covered[at] = state.surfaces[0], True
+    state = state.with_surfaces(grown.fill(covered, rho))
     terms = [
         smoothness(grown, 0, term.weight, term.disparity),
         *(t for t in old.others if t is not term),

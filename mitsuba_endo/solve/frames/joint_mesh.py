@@ -55,8 +55,8 @@ def joint_mesh_problem(
         law: name of the projector's projection model.
     """
     views = [
-        RangeFrame(place.scale * frame.range, camera, place.world_from_camera)
-        for frame, place in zip(frames, registered, strict=True)
+        RangeFrame(registration.scale * frame.range, camera, registration.world_from_camera)
+        for frame, registration in zip(frames, registered, strict=True)
         if frame.range is not None
     ]
     values = registered_values(frames, registered)
@@ -74,8 +74,8 @@ def joint_mesh_problem(
 def _spacing(frames: Sequence[FrameSolution], registered: Sequence[Registration]) -> float:
     """Return the spacing of the frames' own surfaces, baselines of the first frame."""
     sizes = [
-        place.scale * frame.cell * float(np.median(np.linalg.norm(frame.points, axis=1)))
-        for frame, place in zip(frames, registered, strict=True)
+        registration.scale * frame.cell * float(np.median(np.linalg.norm(frame.points, axis=1)))
+        for frame, registration in zip(frames, registered, strict=True)
     ]
     return float(np.median(sizes))
 

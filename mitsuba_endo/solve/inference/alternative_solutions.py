@@ -55,24 +55,24 @@ def superior(result: OptimisationResult) -> list[tuple[list[int], AlternativePos
     """
     out = []
     for frames in _groups(result.problem.layout):
-        found = _alternative_poses(result, result.noise.sigma, frames)
-        out += [(frames, alternative) for alternative in found if alternative.better]
+        alternatives = _alternative_poses(result, result.noise.sigma, frames)
+        out += [(frames, alternative) for alternative in alternatives if alternative.better]
     return out
 
 
 def describe_alternative(
-    alternative: AlternativePose, names: list[str], found: RigidTransform, focal: float
+    alternative: AlternativePose, names: list[str], solution_pose: RigidTransform, focal: float
 ) -> Alternative:
     """Describe an alternative for the solution.
 
     Args:
         alternative: another calibration.
         names: of the frames that it concerns.
-        found: the solution's pose in its own unit.
+        solution_pose: the solution's pose in its own unit.
         focal: the solution's, pattern pixels.
     """
     pose = alternative.projector_from_camera
-    turned, moved = np.degrees(_distances(pose, found))
+    turned, moved = np.degrees(_distances(pose, solution_pose))
     kind = (
         "the other pose of a plane: the surface seen is nearly planar"
         if alternative.planar
@@ -93,7 +93,7 @@ def describe_alternative(
     return Alternative(
         frames=names,
         R=pose.R.tolist(),
-        t=(np.linalg.norm(found.t) * pose.t).tolist(),
+        t=(np.linalg.norm(solution_pose.t) * pose.t).tolist(),
         focal=alternative.focal,
         cost_ratio=alternative.cost_ratio,
         decided=alternative.decided,
@@ -143,8 +143,8 @@ def _distinct(
     assert slot is not None  # groups hold poses that are unknowns
     std = np.sqrt(np.diag(covariance)[slot])
     region = _REGION * np.array([np.linalg.norm(std[:3]), np.linalg.norm(std[3:])])
-    found = _alternative_poses(result, noise_px, frames)
-    return [r for r in found if (_distances(r.projector_from_camera, pose) > region).any()]
+    alternatives = _alternative_poses(result, noise_px, frames)
+    return [r for r in alternatives if (_distances(r.projector_from_camera, pose) > region).any()]
 
 
 def _distances(a: RigidTransform, b: RigidTransform) -> NDArray[np.float64]:
@@ -155,12 +155,12 @@ def _distances(a: RigidTransform, b: RigidTransform) -> NDArray[np.float64]:
 def _correspondences(result: OptimisationResult, frames: list[int]) -> Correspondences:
     """Return the correspondences that the robust loss kept; frames are told apart by rows."""
     pixel, rays, q = [], [], []
-    for place, k in enumerate(frames):
+    for index, k in enumerate(frames):
         frame = result.problem.observed[k]
         used = result.weights[k] > USED_WEIGHT
         x, y = frame.pixels[used].T
         height, width = frame.shape
-        pixel.append((place * height + y) * width + x)
+        pixel.append((index * height + y) * width + x)
         rays.append(result.problem.rays(result.state, k)[used].T)
         q.append(frame.q[:, used])
     return Correspondences(

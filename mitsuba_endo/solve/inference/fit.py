@@ -79,10 +79,10 @@ class Fit:
 
         What is rendered and compared with the maps stays at ``state``, as the given values do.
         """
-        found = None if self.model is None else self.model.correction
-        if found is None:
+        correction = None if self.model is None else self.model.correction
+        if correction is None:
             return self.state
-        return self.problem.retract(self.state, found.surface_shifts, found.shift)
+        return self.problem.retract(self.state, correction.surface_shifts, correction.shift)
 
     @property
     def problem(self) -> Problem:

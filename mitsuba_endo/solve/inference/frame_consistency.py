@@ -101,22 +101,22 @@ def consistencies(alone: list[FrameSolution], result: OptimisationResult) -> lis
     return [_consistency(a, result, k, total - own[k]) for k, a in enumerate(alone)]
 
 
-def doubtful_frames(found: list[Consistency]) -> list[str]:
+def doubtful_frames(agreements: list[Consistency]) -> list[str]:
     """Return warnings of the frames that fit badly, each with what to do.
 
     Where most frames fit the common surface worse than alone, none of them is the wrong one: alone
     a frame's surface takes up what its decoder's errors have in common, or the surface moved.
     """
-    doubtful = [a for a in found if a.doubtful]
+    doubtful = [a for a in agreements if a.doubtful]
     ratios = [a.ratio for a in doubtful if a.ratio > _DOUBTFUL]
-    if len(found) > 2 and len(ratios) > len(found) / 2:
+    if len(agreements) > 2 and len(ratios) > len(agreements) / 2:
         return [
-            f"{len(ratios)} of {len(found)} frames fit the common surface {min(ratios):.2g} to "
-            f"{max(ratios):.2g} times worse than each a surface of its own, as maps do whose "
-            "errors are alike over many pixels, or surfaces that moved; if yours may have "
-            "moved, compare with --share surface=per_frame"
+            f"{len(ratios)} of {len(agreements)} frames fit the common surface "
+            f"{min(ratios):.2g} to {max(ratios):.2g} times worse than each a surface of its own, "
+            "as maps do whose errors are alike over many pixels, or surfaces that moved; "
+            "if yours may have moved, compare with --share surface=per_frame"
         ]
-    return [_doubt(a, first=a is found[0], several=len(found) > 2) for a in doubtful]
+    return [_doubt(a, first=a is agreements[0], several=len(agreements) > 2) for a in doubtful]
 
 
 def _doubt(frame: Consistency, *, first: bool, several: bool) -> str:
@@ -128,21 +128,21 @@ def _doubt(frame: Consistency, *, first: bool, several: bool) -> str:
     return f"{said}; calibrate without it if you need the others' best values"
 
 
-def plan_refuted(found: list[Consistency], layout: Layout, left_out: int) -> str:
+def plan_refuted(agreements: list[Consistency], layout: Layout, left_out: int) -> str:
     """Say that the sharing plan is wrong where most frames contradict it, else nothing.
 
     One frame that does not belong to the others is left out and the rest solved again; where the
     plan ties what moved, that would go on to the last frame, a joint solution each time.
 
     Args:
-        found: agreement of every frame with the joint solution.
+        agreements: of every frame with the joint solution.
         layout: with the plan.
         left_out: frames that were left out before.
     """
-    count = len(found) + left_out
-    contradicting = [a for a in found if a.wrong and not a.stray]
+    count = len(agreements) + left_out
+    contradicting = [a for a in agreements if a.wrong and not a.stray]
     tied = layout.sharing("projector_pose") != "per_frame"
-    many = len(contradicting) > len(found) / 2 or left_out >= count * _MOST_LEFT_OUT
+    many = len(contradicting) > len(agreements) / 2 or left_out >= count * _MOST_LEFT_OUT
     if not (tied and contradicting and count >= _ENOUGH and many):
         return ""
     ratio = np.median([a.ratio for a in contradicting])
@@ -153,10 +153,10 @@ def plan_refuted(found: list[Consistency], layout: Layout, left_out: int) -> str
     )
 
 
-def worst(found: list[Consistency]) -> int | None:
+def worst(agreements: list[Consistency]) -> int | None:
     """Return the index of the most clearly wrong frame, or None."""
-    wrong = [k for k, a in enumerate(found) if a.wrong]
-    return max(wrong, key=lambda k: (found[k].stray, found[k].ratio), default=None)
+    wrong = [k for k, a in enumerate(agreements) if a.wrong]
+    return max(wrong, key=lambda k: (agreements[k].stray, agreements[k].ratio), default=None)
 
 
 def _consistency(
@@ -187,11 +187,11 @@ def chance(alone: FrameSolution, result: OptimisationResult, frame: int) -> floa
     own = alone.state
     scale = np.array([u.scale for u in unknowns(layout, own, 1.0)])
     values, vectors = np.linalg.eigh(alone.information * np.outer(scale, scale))
-    known = values > _OWN_STD**-2
+    determined = values > _OWN_STD**-2
     joint = _in_own_unit(layout, own, result.state, frame)
     moved = layout.difference(own, joint) / scale
-    along = np.sqrt(values[known]) * (vectors.T[known] @ moved)
-    return float(chdtrc(max(int(known.sum()), 1), along @ along))
+    along = np.sqrt(values[determined]) * (vectors.T[determined] @ moved)
+    return float(chdtrc(max(int(determined.sum()), 1), along @ along))
 
 
 def _in_own_unit(layout: Layout, own: State, joint: State, frame: int) -> State:

@@ -56,9 +56,9 @@ def _block_contributions(
         # Products over pixels first: rows as wide as all unknowns would fill the memory.
         L, Z, w = local[rows], surface[rows], weighted[rows]
         coupling = (Z.T @ L).T
-        seen = np.flatnonzero(coupling.any(0))
-        Z, near = Z[:, seen], X[seen]
-        cross = T.T @ coupling[:, seen] @ near
+        coupled = np.flatnonzero(coupling.any(0))
+        Z, near = Z[:, coupled], X[coupled]
+        cross = T.T @ coupling[:, coupled] @ near
         H = T.T @ (L.T @ L) @ T - cross - cross.T + near.T @ (Z.T @ Z @ near)
         yield H, T.T @ (L.T @ w) - near.T @ (Z.T @ w)
 
@@ -115,8 +115,8 @@ def _step_without_frame(
 ) -> NDArray[np.float64]:
     """Return the same without a frame; unknowns that only it tells keep their value."""
     scale, values, vectors = _scaled(reduced.S, H)
-    known = values > _ONLY_HERE * values.max(initial=0.0)
-    inverse = np.where(known, 1 / np.maximum(values, 1e-300), 0.0)
+    determined = values > _ONLY_HERE * values.max(initial=0.0)
+    inverse = np.where(determined, 1 / np.maximum(values, 1e-300), 0.0)
     return scale * (vectors @ (inverse * (vectors.T @ (scale * (g - reduced.g)))))
 
 

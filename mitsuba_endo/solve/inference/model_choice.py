@@ -40,15 +40,15 @@ def choose_law(fits: list[Fit]) -> tuple[Fit, dict[str, Any], list[str]]:
     significance = total / error if error > 0 else 0.0
     open_ = _may_gain(fits[other])
     decided = total - open_ > max(MIN_EVIDENCE, MIN_SIGNIFICANCE * error)
-    name, rival = fits[best].law, fits[other].law
+    name, other_law = fits[best].law, fits[other].law
     how = f"{total:.{0 if decided else 1}f}, {significance:.1f} standard errors"
     text = (
-        f"the residuals support {name} over {rival}: log-likelihood higher by {how}"
+        f"the residuals support {name} over {other_law}: log-likelihood higher by {how}"
         if decided
-        else f"the residuals cannot tell {name} from {rival}: log-likelihood differs by {how}"
+        else f"the residuals cannot tell {name} from {other_law}: log-likelihood differs by {how}"
     )
     if open_ > 0:
-        text += f"; the fit of {rival} had not converged and may gain about {open_:.0f}"
+        text += f"; the fit of {other_law} had not converged and may gain about {open_:.0f}"
     if not decided and _settled(fits[other]) and not _settled(fits[best]):
         best = other  # the data allow both, and this one is finished
     evidence = {

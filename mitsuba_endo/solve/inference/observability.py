@@ -130,11 +130,11 @@ def correlation(covariance: NDArray[np.float64], names: list[Unknown]) -> dict[s
         std = np.sqrt(np.diag(covariance))
         matrix = covariance / np.outer(std, std)
     has_variance = np.isfinite(std) & (std > 0)
-    known = np.isfinite(matrix) & np.outer(has_variance, has_variance)
-    rounded = np.round(np.where(known, matrix, 0.0), 4).tolist()
+    finite = np.isfinite(matrix) & np.outer(has_variance, has_variance)
+    rounded = np.round(np.where(finite, matrix, 0.0), 4).tolist()
     entries = [
-        [value if is_known else None for value, is_known in zip(*row, strict=True)]
-        for row in zip(rounded, known.tolist(), strict=True)
+        [value if is_finite else None for value, is_finite in zip(*row, strict=True)]
+        for row in zip(rounded, finite.tolist(), strict=True)
     ]
     return {"unknowns": [n.words for n in names], "matrix": entries}
 

@@ -38,7 +38,7 @@ _MOST_EXCESS = 100.0
 class Information:
     """What the data tell about the global unknowns, in noise variances."""
 
-    known: NDArray[np.float64]
+    information: NDArray[np.float64]
     """(G, G) information I of the data."""
     score: NDArray[np.float64]
     """(G, G) variance V of the score of the calibration. Noise on its surface that passes for
@@ -49,8 +49,8 @@ class Information:
 
         The covariance of an estimator that solves a score equation (Huber 1967).
         """
-        inverse = inverse_information(self.known)
-        if self.score is self.known or not len(inverse):
+        inverse = inverse_information(self.information)
+        if self.score is self.information or not len(inverse):
             return inverse
         scale = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
         values, vectors = np.linalg.eigh(inverse / np.outer(scale, scale))
@@ -90,7 +90,7 @@ def data_information(
         reduced: the same, reduced.
         variance: of one coordinate, pattern pixels squared.
     """
-    S, known = _information(smooth, smooth.state, normal), _priors(smooth)
+    S, of_priors = _information(smooth, smooth.state, normal), _priors(smooth)
     scale = np.array([u.scale for u in problem_unknowns(smooth.problem, smooth.state)])
     weakest = scipy.linalg.eigvalsh(S * np.outer(scale, scale))[:1]
     if not len(S) or weakest[0] * _DOUBTFUL**2 > variance:
@@ -103,7 +103,7 @@ def data_information(
         again = at.normal_equations(smooth.noise, smooth.weights)
         noisy.append(_information(smooth, state, again))
     return Information(
-        without_false_information(S - known, np.mean(noisy, axis=0) - known) + known,
+        without_false_information(S - of_priors, np.mean(noisy, axis=0) - of_priors) + of_priors,
         _information(result, result.state, result.normal_equations()),
     )
 

@@ -27,9 +27,9 @@ def seen_faces(result: OptimisationResult, surface: int) -> NDArray[np.bool_]:
     for k, at in enumerate(result.evaluation.frames):
         if problem.layout.surface_of[k] == surface:
             support += result.support(k)
-            seen, w = at.faces[at.hits], result.weights[k][at.hits]
-            weight += np.bincount(seen, w, len(shape.faces))
-            count += np.bincount(seen, minlength=len(shape.faces))
+            hit_faces, w = at.faces[at.hits], result.weights[k][at.hits]
+            weight += np.bincount(hit_faces, w, len(shape.faces))
+            count += np.bincount(hit_faces, minlength=len(shape.faces))
     bridges = shape.bridges(result.state.surfaces[surface])
     bridges &= weight < _AGREE * np.maximum(count, 1)
     return (support[shape.faces] >= _SUPPORT).all(1) & ~bridges
@@ -58,11 +58,11 @@ def render_frames(result: OptimisationResult, camera: CameraModel) -> list[Rende
     out = []
     for k, term in enumerate(problem.frames):
         at = term.renderer.at_pixels(pixels[finite]).render(state)
-        seen = at.hit & seen_of[term.surface][at.faces]
+        visible = at.hit & seen_of[term.surface][at.faces]
         q = np.full((len(pixels), 2), np.nan, np.float32)
-        q[finite] = np.where(seen, at.q, np.nan).T
+        q[finite] = np.where(visible, at.q, np.nan).T
         range_ = np.full(len(pixels), np.nan)
-        range_[finite] = np.where(seen, at.distance, np.nan)
+        range_[finite] = np.where(visible, at.distance, np.nan)
         used = np.zeros(shape, bool)
         x, y = term.observed.pixels.T
         used[y, x] = result.weights[k] > USED_WEIGHT

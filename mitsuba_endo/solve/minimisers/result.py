@@ -54,8 +54,8 @@ class OptimisationResult:
     def support(self, frame: int) -> NDArray[np.float64]:
         """Return the robust weight (V,) of one frame's observations around every vertex."""
         surface = self.problem.surface_seen_by(frame)
-        seen = self.evaluation.frames[frame].faces
-        of_face = np.bincount(seen, self.weights[frame], len(surface.faces))
+        hit_faces = self.evaluation.frames[frame].faces
+        of_face = np.bincount(hit_faces, self.weights[frame], len(surface.faces))
         total = np.bincount(surface.faces.ravel(), np.repeat(of_face, 3), surface.size)
         return total.astype(np.float64)
 
@@ -81,8 +81,8 @@ def _quantiles(at: Evaluation) -> tuple[float, ...]:
     """Return quantiles of the residuals' lengths; those of missed correspondences are infinite."""
     squared = np.concatenate([frame.squared for frame in at.frames])
     ordered = np.sort(np.where(np.isfinite(squared), squared, np.inf))
-    places = ((np.arange(_QUANTILES) + 0.5) / _QUANTILES * len(ordered)).astype(int)
-    return tuple(np.sqrt(ordered[places]).tolist()) if len(ordered) else ()
+    indices = ((np.arange(_QUANTILES) + 0.5) / _QUANTILES * len(ordered)).astype(int)
+    return tuple(np.sqrt(ordered[indices]).tolist()) if len(ordered) else ()
 
 
 def with_fixed_cost(trace: list[TraceRow], noise: NoiseScale) -> list[TraceRow]:

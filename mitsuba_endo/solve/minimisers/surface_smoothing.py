@@ -41,5 +41,5 @@ def smooth_surfaces(result: OptimisationResult, options: Options) -> Optimisatio
 
 def _weight(problem: Problem, term: SmoothnessTerm) -> float:
     """Return the weight of a surface's prior, from the observations per vertex."""
-    seen = sum(t.observed.count for t in problem.frames if t.surface == term.index)
-    return prior_weight(problem.surfaces[term.index], seen, _WEIGHT)
+    count = sum(t.observed.count for t in problem.frames if t.surface == term.index)
+    return prior_weight(problem.surfaces[term.index], count, _WEIGHT)

@@ -47,9 +47,9 @@ def assemble(
         InputError: the scale cannot be resolved.
     """
     renderings = render_frames(fit.reported, camera)
-    seen = {m.name: r.range for m, r in zip(fit.maps, renderings, strict=True)}
+    ranges = {m.name: r.range for m, r in zip(fit.maps, renderings, strict=True)}
     refined = fit.problem.camera(fit.state)
-    unit = resolve_unit(rig, refined, [seen.get(name) for name in fit.given])
+    unit = resolve_unit(rig, refined, [ranges.get(name) for name in fit.given])
     estimates = Estimates(fit, unit)
     surfaces = [
         surface_estimate(fit, i, unit.factor, inflation(fit))
@@ -94,12 +94,12 @@ def assemble(
 
 def _implausible_scale(fit: Fit, unit: Unit, renderings: list[Rendering], rig: Rig) -> list[str]:
     """Return a warning where the scale implies a working distance that no such rig has."""
-    seen = renderings[0].range[np.isfinite(renderings[0].range)]
-    if not len(seen):
+    ranges = renderings[0].range[np.isfinite(renderings[0].range)]
+    if not len(ranges):
         return []
     baseline = unit.factor * float(np.linalg.norm(fit.state.at("projector_pose", 0).t))
-    found = working_distance(baseline, unit.factor * float(np.median(seen)), rig)
-    return [finding.warning for finding in found]
+    findings = working_distance(baseline, unit.factor * float(np.median(ranges)), rig)
+    return [finding.warning for finding in findings]
 
 
 def _alternatives(estimates: Estimates) -> list[Alternative]:

@@ -81,8 +81,8 @@ class Estimates:
             )
             for k in range(self.layout.frames)
         ]
-        known, reported = self.fit.uncertainty, self.fit.reported
-        return ambiguities(reported, known.sigma, self.covariance, determined)
+        uncertainty, reported = self.fit.uncertainty, self.fit.reported
+        return ambiguities(reported, uncertainty.sigma, self.covariance, determined)
 
     def status(self, slot: slice) -> Status:
         """Return the status of a block with the unknowns at ``slot``.
@@ -134,15 +134,17 @@ class Estimates:
             return PoseEstimate(R=None, t=None, status=status, reason=reason)
         if name == "projector_pose" and self._ambiguous(frame):
             status, reason = "weak", f"{AMBIGUOUS}; {reason}" if reason else AMBIGUOUS
-        known = self.fit.uncertainty
-        jackknives = [c for c in (known.jackknife, known.frame_jackknife) if c is not None]
+        uncertainty = self.fit.uncertainty
+        jackknives = [
+            c for c in (uncertainty.jackknife, uncertainty.frame_jackknife) if c is not None
+        ]
         candidates = [self._pose_std(name, frame, own, c) for c in jackknives]
         covariance = self._pose_covariance(name, frame, own, self.covariance)
         return PoseEstimate.of(
             pose,
             std=_deviations(covariance),
             covariance=covariance.tolist(),
-            std_formal=self._pose_std(name, frame, own, known.formal),
+            std_formal=self._pose_std(name, frame, own, uncertainty.formal),
             std_jackknife=[float(x) for x in np.max(candidates, axis=0)] if candidates else None,
             status=status,
             reason=reason,
@@ -202,8 +204,10 @@ class Estimates:
 
 def jackknife_variances(fit: Fit) -> list[Floats]:
     """Return the variances (G,) of every jackknife that was computed."""
-    known = fit.uncertainty
-    return [np.diag(c) for c in (known.jackknife, known.frame_jackknife) if c is not None]
+    uncertainty = fit.uncertainty
+    return [
+        np.diag(c) for c in (uncertainty.jackknife, uncertainty.frame_jackknife) if c is not None
+    ]
 
 
 def inflation(fit: Fit) -> float:

@@ -23,9 +23,9 @@ def grouped(reasons: Iterable[tuple[str, str]], one: str, several: str) -> list[
     for name, reason in reasons:
         groups.setdefault(alike(reason), []).append((name, reason))
     out = []
-    for found in groups.values():
-        names = listed([name for name, _ in found])
-        head = (one if len(found) == 1 else several).format(names=names, count=len(found))
-        first = f"{found[0][0]}: " if len(found) > 1 else ""
-        out.append(f"{head}: {first}{found[0][1]}")
+    for group in groups.values():
+        names = listed([name for name, _ in group])
+        head = (one if len(group) == 1 else several).format(names=names, count=len(group))
+        first = f"{group[0][0]}: " if len(group) > 1 else ""
+        out.append(f"{head}: {first}{group[0][1]}")
     return out

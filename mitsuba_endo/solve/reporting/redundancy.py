@@ -74,11 +74,11 @@ def changed_share(a: CorrespondenceMap, b: CorrespondenceMap, limit: float) -> f
 
 def image_motion(a: FrameView, b: FrameView, camera: CameraModel) -> float:
     """Return by how many pixels (median) the points that ``a`` sees have moved in ``b``."""
-    seen = np.isfinite(a.points[..., 0])
-    if not seen.any():
+    finite = np.isfinite(a.points[..., 0])
+    if not finite.any():
         return np.inf
     b_from_a = b.world_from_camera.inverse() @ a.world_from_camera
-    moved = camera.project(b_from_a.apply(a.points[seen])) - camera.pixel_grid()[seen]
+    moved = camera.project(b_from_a.apply(a.points[finite])) - camera.pixel_grid()[finite]
     distance = np.linalg.norm(moved, axis=-1)
     return float(np.median(np.where(np.isfinite(distance), distance, np.inf)))
 

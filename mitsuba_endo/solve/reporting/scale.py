@@ -55,22 +55,24 @@ def resolve_unit(
         if ranges[0] is None and rig.share.projector_pose == "per_frame":
             return _up_to_scale("scale.baseline is that of the first frame, which was left out")
         return Unit(scale.baseline, "baseline", scale.baseline_std / scale.baseline)
-    known = scale.known_distance
-    if known is None:
+    distance = scale.known_distance
+    if distance is None:
         return Unit(1.0, "up_to_scale", 0.0)
-    image = ranges[known.frame]
+    image = ranges[distance.frame]
     if image is None:
         return _up_to_scale("the frame of scale.known_distance was left out")
-    pixels = np.array(known.pixels)
+    pixels = np.array(distance.pixels)
     at = np.array([_bilinear(image, p) for p in pixels])
     if not np.isfinite(at).all():
         raise InputError(
-            f"no surface was measured at {known.pixels}", "scale.known_distance.pixels",
+            f"no surface was measured at {distance.pixels}", "scale.known_distance.pixels",
             "choose points inside the measured part of the image",
         )  # fmt: skip
     ends = camera.rays(pixels) * at[:, None]
     return Unit(
-        float(known.mm / np.linalg.norm(ends[0] - ends[1])), "known_distance", known.std / known.mm
+        float(distance.mm / np.linalg.norm(ends[0] - ends[1])),
+        "known_distance",
+        distance.std / distance.mm,
     )
 
 

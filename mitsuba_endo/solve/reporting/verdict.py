@@ -45,12 +45,12 @@ def _all_poses(solution: Solution, several: bool, unit: str) -> list[str]:
     out = [] if several else _pose("Projector pose", projectors[0][1], unit)
     for device, poses in (("Projector", projectors if several else []), ("Camera", cameras)):
         poses = [(name, pose) for name, pose in poses if pose.status != "fixed"]
-        known = [pose.std for _, pose in poses if pose.t is not None and pose.std is not None]
-        if known:
-            turned, moved = (INTERVAL * np.array([max(s[p]) for s in known])
+        deviations = [pose.std for _, pose in poses if pose.t is not None and pose.std is not None]
+        if deviations:
+            turned, moved = (INTERVAL * np.array([max(s[p]) for s in deviations])
                              for p in (np.s_[:3], np.s_[3:]))  # fmt: skip
             out.append(
-                f"{device} poses of {len(known)} frames: translations within ± "
+                f"{device} poses of {len(deviations)} frames: translations within ± "
                 f"{np.median(moved):.2g} {unit} (at most {moved.max():.2g}), rotations within ± "
                 f"{np.degrees(np.median(turned)):.2g} degrees (95 %); each is in frames.csv."
             )
@@ -58,10 +58,10 @@ def _all_poses(solution: Solution, several: bool, unit: str) -> list[str]:
         for name, pose in poses:
             if pose.status in ("weak", "unobservable"):
                 wary.setdefault((pose.status, alike(pose.reason or "")), []).append((name, pose))
-        for (status, _), found in wary.items():
+        for (status, _), group in wary.items():
             how = "only weakly determined" if status == "weak" else "not determined"
-            names = listed([name for name, _ in found])
-            out.append(f"{device} poses of {names}: {how}; {found[0][1].reason}.")
+            names = listed([name for name, _ in group])
+            out.append(f"{device} poses of {names}: {how}; {group[0][1].reason}.")
     return out
 
 

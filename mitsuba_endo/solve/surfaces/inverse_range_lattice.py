@@ -134,14 +134,14 @@ class Lattice(Surface):
         inside = (column >= 0) & (row >= 0) & (column < index.shape[1]) & (row < index.shape[0])
         return np.where(inside, index[np.where(inside, row, 0), np.where(inside, column, 0)], -1)
 
-    def fill(self, seen: NDArray[np.bool_], rho: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Give vertices that are not ``seen`` (V,) the inverse range of the nearest seen one."""
+    def fill(self, covered: NDArray[np.bool_], rho: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give vertices that are not ``covered`` (V,) the inverse range of the nearest that is."""
         index = self._index()
-        known = np.zeros(index.shape, bool)
-        known[self._place_in_index()] = seen
-        nearest = np.empty((2, *known.shape), np.int32)
+        covered_grid = np.zeros(index.shape, bool)
+        covered_grid[self._place_in_index()] = covered
+        nearest = np.empty((2, *covered_grid.shape), np.int32)
         ndimage.distance_transform_edt(
-            ~known, return_distances=False, return_indices=True, indices=nearest
+            ~covered_grid, return_distances=False, return_indices=True, indices=nearest
         )
         row, column = self._place_in_index()
         return rho[index[nearest[0, row, column], nearest[1, row, column]]]

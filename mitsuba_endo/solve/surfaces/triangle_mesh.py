@@ -140,8 +140,8 @@ def triangle_mesh(
     graph = sp.csr_array((ones, edges.T), shape=(count, count))
     # Bends couple the far corners of neighbouring triangles: two steps along edges.
     order = np.asarray(reverse_cuthill_mckee(sp.csr_matrix(graph + graph.T), symmetric_mode=True))
-    place = np.empty(count, np.int64)
-    place[order] = np.arange(count)
+    position = np.empty(count, np.int64)
+    position[order] = np.arange(count)
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    mesh = TriangleMesh(vertices[order], unit[order], distances[order], place[faces])
+    mesh = TriangleMesh(vertices[order], unit[order], distances[order], position[faces])
     return mesh, order.astype(np.int64)

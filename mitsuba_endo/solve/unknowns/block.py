@@ -176,8 +176,8 @@ class LogarithmBlock(VectorBlock):
         return np.exp(value)
 
     def suspects(self, names: Sequence[str]) -> list[Suspect]:
-        found = super().suspects(names)
-        return [replace(s, step=0.01 * s.step, unit="%") for s in found]
+        suspects = super().suspects(names)
+        return [replace(s, step=0.01 * s.step, unit="%") for s in suspects]
 
 
 class PoseBlock(Block):

@@ -98,8 +98,8 @@ class ModelCheck:
         if self.causes.gross:
             return self.causes.candidates[:1]
         limit = -ndtri(FALSE_ALARMS / 2 / max(len(self.tests.candidates), 1)) * self.understated
-        found = [c for c in self.causes.candidates if c.deviations > limit]
-        return found if self._telling else []
+        unexplained = [c for c in self.causes.candidates if c.deviations > limit]
+        return unexplained if self._telling else []
 
     @property
     def _telling(self) -> bool:
@@ -157,8 +157,8 @@ class ModelCheck:
     def surface_error(self, surface: int) -> Floats:
         """Return what may be left (V,) of the error that given values made to a surface."""
         assert self.nuisance is not None
-        found = self.nuisance if self.correction is None else self.correction
-        return self.correction_std * found.surface_shifts[surface]
+        error = self.nuisance if self.correction is None else self.correction
+        return self.correction_std * error.surface_shifts[surface]
 
     @property
     def added(self) -> Floats | None:
@@ -202,18 +202,22 @@ def _doubting(check: ModelCheck, extended: Extended, rig: Rig, variance: float) 
     result, tests = extended.result, check.tests
     roots = doubtful(rig, result.problem.layout, stated=not check.wrong)
     if not check.wrong:
-        known = nuisance(extended, roots, variance * check.effect, widen=False) if roots else None
+        given_errors = (
+            nuisance(extended, roots, variance * check.effect, widen=False) if roots else None
+        )
         blind = [] if check.decoded else unchecked(extended, rig, variance)
-        return replace(check, nuisance=known, unchecked=blind)
+        return replace(check, nuisance=given_errors, unchecked=blind)
     white = not _structured(tests.after) and tests.after.effect.largest <= 1
     effect = 1.0 if white and not check.refuted_plan else check.effect
     causes = named(tests, _refits(result, rig, tests), result.problem.law)
-    known = nuisance(extended, roots, variance * effect, widen=True)
-    found = replace(check, effect=effect, causes=causes, nuisance=known)
-    if found.refuted_plan:  # that is no error of given values
-        return found
-    priors = {name: np.sqrt(effect) * root for name, root in known.roots.items()}
-    return replace(found, correction=correction(extended, priors, known.step, causes.ends))
+    given_errors = nuisance(extended, roots, variance * effect, widen=True)
+    completed = replace(check, effect=effect, causes=causes, nuisance=given_errors)
+    if completed.refuted_plan:  # that is no error of given values
+        return completed
+    priors = {name: np.sqrt(effect) * root for name, root in given_errors.roots.items()}
+    return replace(
+        completed, correction=correction(extended, priors, given_errors.step, causes.ends)
+    )
 
 
 def _refits(result: OptimisationResult, rig: Rig, tests: Tests) -> list[Refit]:
@@ -247,14 +251,14 @@ def _spread(shifts: Sequence[Floats]) -> Floats:
 
     With their correlations, and so that no variance is below the square of the largest.
     """
-    found = sum(np.outer(s, s) for s in shifts)
+    total = sum(np.outer(s, s) for s in shifts)
     largest = np.max(np.abs(shifts), axis=0)
-    root = largest / np.sqrt(np.maximum(np.diag(found), 1e-300))
-    return found * np.outer(root, root)
+    root = largest / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    return total * np.outer(root, root)
 
 
-def _structured(found: Correlation) -> bool:
-    return found.structure.deviations > STRUCTURED
+def _structured(correlation: Correlation) -> bool:
+    return correlation.structure.deviations > STRUCTURED
 
 
 def _beyond(effect: float, factor: float) -> float:

@@ -37,23 +37,25 @@ class Named:
     """Where the refits of those under the fit's own projection model ended."""
 
 
-def named(tests: Tests, found: Sequence[Refit], law: str) -> Named:
+def named(tests: Tests, refits: Sequence[Refit], law: str) -> Named:
     """Return the candidates in the order in which they explain the residuals.
 
     Args:
         tests: of the fit.
-        found: refits, the best first.
+        refits: the best first.
         law: projection model of the fit.
     """
-    best = max((r.gain for r in found), default=0.0)
+    best = max((r.gain for r in refits), default=0.0)
     if best < GROSS:
         return _by_scores(tests)
-    known = {c.key: c for c in tests.candidates}
-    first = [_candidate(r, known.get(r.variant.key)) for r in found if r.variant.layout is None]
+    by_key = {c.key: c for c in tests.candidates}
+    first = [_candidate(r, by_key.get(r.variant.key)) for r in refits if r.variant.layout is None]
     keys = {c.key for c in first}
     rest = [replace(c, gain=0.0) for c in tests.candidates if c.key not in keys]
-    as_good = [r for r in found if r.gain > _enough(best, ALIKE)]
-    plan = found[0].variant.key.removeprefix(PLAN) if found[0].variant.layout is not None else None
+    as_good = [r for r in refits if r.gain > _enough(best, ALIKE)]
+    plan = (
+        refits[0].variant.key.removeprefix(PLAN) if refits[0].variant.layout is not None else None
+    )
     shifts = [r.shift for r in as_good if r.shift is not None]
     left = min(r.left for r in as_good)
     ends = [r.end for r in as_good if r.variant.layout is None and r.variant.law == law]
@@ -65,10 +67,10 @@ def _by_scores(tests: Tests) -> Named:
     single = max((c.gain for c in tests.candidates), default=0.0)
     # What needs several values of a block comes first only where no single value does as well.
     blocks = [c for c in tests.blocks if single < _enough(c.gain, noise)]
-    found = _grouped(sorted([*tests.candidates, *blocks], key=lambda c: -c.gain), noise)
-    best = max((c.gain for c in found), default=0.0)
-    shifts = [c.shift for c in found if c.shift is not None and c.gain > _enough(best, noise)]
-    return Named(found, shifts=shifts)
+    ordered = _grouped(sorted([*tests.candidates, *blocks], key=lambda c: -c.gain), noise)
+    best = max((c.gain for c in ordered), default=0.0)
+    shifts = [c.shift for c in ordered if c.shift is not None and c.gain > _enough(best, noise)]
+    return Named(ordered, shifts=shifts)
 
 
 def _enough(best: float, noise: float) -> float:
@@ -76,21 +78,21 @@ def _enough(best: float, noise: float) -> float:
     return min(AS_GOOD * best, best - noise)
 
 
-def _candidate(refit: Refit, known: ModelCandidate | None) -> ModelCandidate:
+def _candidate(refit: Refit, tested: ModelCandidate | None) -> ModelCandidate:
     """Return a candidate with the value that a refit found."""
     key = refit.variant.key
-    if known is None:
+    if tested is None:
         block = refit.variant.steps[0][0] if refit.variant.steps else None
         words = BLOCKS[key].words if key in BLOCKS else _MATRIX_WORDS
-        known = ModelCandidate(key, words, "", block, 0.0, np.inf, 0.0)
+        tested = ModelCandidate(key, words, "", block, 0.0, np.inf, 0.0)
     value, share = refit.value, 1 - refit.left
-    return replace(known, value=value, gain=refit.gain, shift=refit.shift, share=share)
+    return replace(tested, value=value, gain=refit.gain, shift=refit.shift, share=share)
 
 
-def _grouped(found: Sequence[ModelCandidate], noise: float) -> list[ModelCandidate]:
+def _grouped(candidates: Sequence[ModelCandidate], noise: float) -> list[ModelCandidate]:
     """Return the candidates, the first with the words of those that explain as much."""
-    if not found:
+    if not candidates:
         return []
-    best = max(c.gain for c in found)
-    alike = [(c.key, c.words) for c in found[1:] if c.gain > _enough(best, noise)]
-    return [replace(found[0], group=tuple(alike)), *found[1:]]
+    best = max(c.gain for c in candidates)
+    alike = [(c.key, c.words) for c in candidates[1:] if c.gain > _enough(best, noise)]
+    return [replace(candidates[0], group=tuple(alike)), *candidates[1:]]

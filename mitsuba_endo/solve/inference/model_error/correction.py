@@ -83,7 +83,7 @@ def correction(
     problem, judge = _freed(extended, roots), replace(result.noise, last=True)
     minimiser = LevenbergMarquardt(_TOLERANCE, _ITERATIONS)
     base = evaluate(problem, extended.state)
-    starts = [_placed(extended, other) for other in others]
+    starts = [_with_values_of(extended, other) for other in others]
     starts = starts or [_stepped(extended, problem, step, 1.0)]
     best = min((_followed(problem, start) for start in starts), key=lambda at: at.cost(judge))
     held = _held(extended, roots, best.state)
@@ -123,7 +123,7 @@ def _stepped(extended: Extended, problem: Problem, step: Floats, share: float) -
     return problem.retract(extended.state, surfaces, share * step[: extended.layout.columns])
 
 
-def _placed(extended: Extended, other: State) -> State:
+def _with_values_of(extended: Extended, other: State) -> State:
     """Return a state with another's values, where that has all of their components."""
     old, values = extended.result.problem.layout, dict(extended.state.values)
     for name, own in other.values.items():

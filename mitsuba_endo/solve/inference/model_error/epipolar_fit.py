@@ -42,7 +42,7 @@ class EpipolarFrame:
     pose: RigidTransform
     rays: Floats
     """(3, n) directions of any length in the camera's frame."""
-    seen: Bearings
+    bearings: Bearings
     at: Residuals
     root: Floats | float
     """(n,) square root of the weights."""
@@ -81,13 +81,15 @@ def epipolar_frame(
         else:
             rays = np.stack(model.camera.direction_uv(*observed.pixels.T.astype(np.float64)))
         if last is not None and projector == last.projector:
-            seen = last.seen
+            pattern_bearings = last.bearings
         else:
-            near = None if last is None or law != last.law else last.seen
-            seen = bearings(model.projector, observed.q, near)
+            near = None if last is None or law != last.law else last.bearings
+            pattern_bearings = bearings(model.projector, observed.q, near)
         pose = state.at("projector_pose", k)
-        at = residuals(pose, rays, seen)
-    return EpipolarFrame(law, camera, projector, pose, rays, seen, at, _root_weight(observed))
+        at = residuals(pose, rays, pattern_bearings)
+    return EpipolarFrame(
+        law, camera, projector, pose, rays, pattern_bearings, at, _root_weight(observed)
+    )
 
 
 def derivatives(
@@ -102,7 +104,7 @@ def derivatives(
         owner = layout.owner(name, k)
         slot, T = layout.slots[name, owner], layout.tangent_map(state, name, owner)
         if name == "projector_pose":
-            out[slot] = T.T @ pose_jacobian(now.pose, now.seen, now.at) * now.root
+            out[slot] = T.T @ pose_jacobian(now.pose, now.bearings, now.at) * now.root
         elif not isinstance(BLOCKS[name], PoseBlock):
             moved = [along(observed, law, state, k, now, name, step) for step in T.T]
             out[slot] = np.array(moved)

@@ -112,14 +112,14 @@ def worth_trying(layout: Layout, rig: Rig, law: str, order: Sequence[str]) -> li
         law: of it.
         order: keys of the candidates, the most explaining first.
     """
-    found = {variant.key: variant for variant in variants(layout, rig, law)}
-    first = [key for key in order if key in found][:_LIKELY]
+    by_key = {variant.key: variant for variant in variants(layout, rig, law)}
+    first = [key for key in order if key in by_key][:_LIKELY]
     others = [
         key
-        for key, variant in found.items()
+        for key, variant in by_key.items()
         if key in _MISJUDGED or variant.law != law or variant.layout is not None
     ]
-    return [found[key] for key in dict.fromkeys([*first, *others])]
+    return [by_key[key] for key in dict.fromkeys([*first, *others])]
 
 
 def refits(

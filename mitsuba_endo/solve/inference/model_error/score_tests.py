@@ -108,10 +108,14 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
     columns = np.array([c.direction for c in named]).T
     W, information, score = extended.directions(columns)
     own = np.einsum("gk,gh,hk->k", columns, extended.S, columns)
-    seen = np.diag(information) > _UNSEEN * own
-    seen &= np.diag(information) > variance / np.array([c.limit for c in named]) ** 2
-    named = [n for n, is_seen in zip(named, seen, strict=True) if is_seen]
-    W, information, score = W[:, seen], information[np.ix_(seen, seen)], score[seen]
+    observable = np.diag(information) > _UNSEEN * own
+    observable &= np.diag(information) > variance / np.array([c.limit for c in named]) ** 2
+    named = [n for n, is_observable in zip(named, observable, strict=True) if is_observable]
+    W, information, score = (
+        W[:, observable],
+        information[np.ix_(observable, observable)],
+        score[observable],
+    )
     # Together, values may have directions that the data hardly see although they see each.
     limits = np.array([c.limit for c in named])
     information = information + np.diag(variance / limits**2)
@@ -122,7 +126,7 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
     noise = variance * after.effect.largest
     energy = _energy(extended.result)
     structured = max(before.structure.excess * energy, 1e-300)
-    found = [
+    tested = [
         ModelCandidate(
             c.key, c.words, c.unit, c.block, float(-g / i), float(np.sqrt(noise / i)),
             float(g * g / i), -g / i * w[extended.solved], min(float(g * g / i / structured), 1.0),
@@ -130,9 +134,9 @@ def score_tests(extended: Extended, rig: Rig, variance: float) -> Tests:
         for c, g, i, w in zip(named, score, np.diag(information), W.T, strict=True)
     ]  # fmt: skip
     chance = float(chdtrc(max(rank, 1), max(gain, 0.0) / noise))
-    blocks = _blocks(found, information, score, W[extended.solved], structured, noise)
-    found.sort(key=lambda c: -c.gain)
-    return Tests(found, blocks, before, after, energy, gain, chance, noise)
+    blocks = _blocks(tested, information, score, W[extended.solved], structured, noise)
+    tested.sort(key=lambda c: -c.gain)
+    return Tests(tested, blocks, before, after, energy, gain, chance, noise)
 
 
 def _after(extended: Extended, step: Floats) -> list[Floats]:
@@ -180,13 +184,13 @@ def candidates(extended: Extended, rig: Rig) -> list[Testable]:
 
 
 def _blocks(
-    found: Sequence[ModelCandidate], information: Floats, score: Floats, W: Floats,
+    tested: Sequence[ModelCandidate], information: Floats, score: Floats, W: Floats,
     structured: float, noise: float,
 ) -> list[ModelCandidate]:  # fmt: skip
     """Return every block of several candidates as one."""
     out = []
-    for name in dict.fromkeys(c.block for c in found if c.block is not None):
-        at = [i for i, c in enumerate(found) if c.block == name]
+    for name in dict.fromkeys(c.block for c in tested if c.block is not None):
+        at = [i for i, c in enumerate(tested) if c.block == name]
         if len(at) < _SEVERAL:
             continue
         step, rank = _joint(information[np.ix_(at, at)], score[at])

@@ -62,8 +62,8 @@ class OtherLaw:
             own.scene, own.camera, term.observed.pixels.astype(np.float64), own.frame,
             own.surface, self.law, rays_stay=own.rays_stay,
         ).render(result.state)  # fmt: skip
-        seen = own.render(result.state)
-        return np.where(other.hit & seen.hit, other.q - seen.q, 0.0)
+        rendered = own.render(result.state)
+        return np.where(other.hit & rendered.hit, other.q - rendered.q, 0.0)
 
 
 @dataclass(frozen=True)

@@ -72,8 +72,8 @@ def unchecked(extended: Extended, rig: Rig, variance: float) -> list[Unchecked]:
         return []
     sample, none = sampled(extended.result, rig, _PIXELS), ModelVariant("", problem.law)
     base = solved(sample, none, point_at(sample, none, extended.result.state), _ITERATIONS)
-    found = [_tried(extended, sample, base, c, variance) for c in doubted]
-    return sorted((f for f in found if f is not None), key=lambda f: -f.moved)
+    tried = [_tried(extended, sample, base, c, variance) for c in doubted]
+    return sorted((f for f in tried if f is not None), key=lambda f: -f.moved)
 
 
 def _doubted(extended: Extended, rig: Rig, variance: float) -> list[Testable]:
