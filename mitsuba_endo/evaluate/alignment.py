@@ -78,9 +78,9 @@ def align_robustly(
     are left out of the next.
     """
     kept = np.ones(len(source))
-    found = align(source, target, scale=scale, rotation=rotation)
+    similarity = align(source, target, scale=scale, rotation=rotation)
     for _ in range(steps):
-        apart = np.linalg.norm(target - found.apply(source), axis=-1)
+        apart = np.linalg.norm(target - similarity.apply(source), axis=-1)
         kept = (apart <= 5 * robust_std(apart)).astype(float)
-        found = align(source, target, kept, scale=scale, rotation=rotation)
-    return found
+        similarity = align(source, target, kept, scale=scale, rotation=rotation)
+    return similarity

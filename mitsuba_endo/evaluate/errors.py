@@ -86,17 +86,17 @@ def is_truth(solution: Solution) -> bool:
 def _metrics_of(
     first: Pair, pair: Pair, solution: Solution, truth: Solution, no_unit: Metric | None
 ) -> dict[str, Metric]:
-    found, true = pair
-    poses = found.projector_from_camera, true.projector_from_camera
+    frame, true = pair
+    poses = frame.projector_from_camera, true.projector_from_camera
     turned, moved = camera_errors(
-        (first[0].world_from_camera, found.world_from_camera),
+        (first[0].world_from_camera, frame.world_from_camera),
         (first[1].world_from_camera, true.world_from_camera),
     )
-    if pair is not first and found.world_from_camera.status == "fixed" and not is_truth(solution):
+    if pair is not first and frame.world_from_camera.status == "fixed" and not is_truth(solution):
         turned = moved = Metric.unknown("the camera's pose is no unknown")
     return {
         "focal_error_percent": focal_error(
-            found.focal or solution.projector.focal, true.focal or truth.projector.focal
+            frame.focal or solution.projector.focal, true.focal or truth.projector.focal
         ),
         "rotation_error_deg": rotation_error(*poses),
         "translation_direction_error_deg": translation_direction_error(*poses),

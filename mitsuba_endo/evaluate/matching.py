@@ -24,12 +24,12 @@ _TOLD = 5
 
 
 def match_names(
-    found: Sequence[str], true: Sequence[Sequence[str]], by: MatchBy = "name"
+    frame_names: Sequence[str], true: Sequence[Sequence[str]], by: MatchBy = "name"
 ) -> tuple[list[int], Matched]:
     """Return for every frame the index of the true one.
 
     Args:
-        found: names of a solution's frames.
+        frame_names: names of a solution's frames.
         true: the names that each frame of the truth may go by.
         by: ``order`` pairs them as they come, which somebody must ask for.
 
@@ -37,22 +37,24 @@ def match_names(
         InputError: a frame has no partner, or two that it might be; or two frames have one.
     """
     if by == "order":
-        if len(found) != len(true):
+        if len(frame_names) != len(true):
             raise InputError(
-                f"{len(true)} frames, and the solution has {len(found)}", "truth",
+                f"{len(true)} frames, and the solution has {len(frame_names)}", "truth",
                 "match them by name",
             )  # fmt: skip
-        return list(range(len(found))), "order"
-    candidates = [[j for j, names in enumerate(true) if _any_same(name, names)] for name in found]
-    if len(found) == len(true) == 1 and not candidates[0]:
-        _refuse_other_folder(found[0], true)
+        return list(range(len(frame_names))), "order"
+    candidates = [
+        [j for j, names in enumerate(true) if _any_same(name, names)] for name in frame_names
+    ]
+    if len(frame_names) == len(true) == 1 and not candidates[0]:
+        _refuse_other_folder(frame_names[0], true)
         return [0], "only"
-    chosen = [_partner(*pair, true) for pair in zip(found, candidates, strict=True)]
+    chosen = [_partner(*pair, true) for pair in zip(frame_names, candidates, strict=True)]
     for i, j in enumerate(chosen):
         if j in chosen[:i]:
-            twice = found[chosen.index(j)]
+            twice = frame_names[chosen.index(j)]
             raise InputError(
-                f"frames {twice} and {found[i]} are both called as {true[j][0]} of the truth",
+                f"frames {twice} and {frame_names[i]} are both called as {true[j][0]} of the truth",
                 "solution", "name frames with their folders, or match by order",
             )  # fmt: skip
     return chosen, "name"

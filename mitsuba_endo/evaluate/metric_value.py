@@ -21,14 +21,14 @@ class Metric:
 
 def rms(metrics: Sequence[Metric], names: Sequence[str]) -> Metric:
     """Return the root mean square over the frames that have a value; the reason names the rest."""
-    known = [f.value for f in metrics if f.value is not None]
+    values = [f.value for f in metrics if f.value is not None]
     missing = [(n, f.reason) for n, f in zip(names, metrics, strict=True) if f.value is None]
     reason = f"frame {missing[0][0]}: {missing[0][1]}" if missing else None
-    if not known:
+    if not values:
         return Metric.unknown(reason or "there are no frames")
     if missing:
-        reason = f"over {len(known)} of {len(metrics)} frames ({reason})"
-    return Metric(root_mean_square(known), reason)
+        reason = f"over {len(values)} of {len(metrics)} frames ({reason})"
+    return Metric(root_mean_square(values), reason)
 
 
 def root_mean_square(values: ArrayLike) -> float:

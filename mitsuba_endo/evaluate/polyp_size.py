@@ -111,15 +111,15 @@ def measure_polyp(
     patch = _patch(surface, camera, np.asarray(middle, np.float64), outline)
     every = np.ones(len(patch.points), bool)
     fits = [_fit(patch, start, every) for start in _starts(patch)]
-    found = min(fits, key=lambda p: _cost(patch, p))
-    size, height = _size(found), found[0] + _above(found)
+    parameters = min(fits, key=lambda p: _cost(patch, p))
+    size, height = _size(parameters), parameters[0] + _above(parameters)
     if not (np.isfinite(size) and height > _LEAST_HEIGHT * np.median(patch.noise)):
         raise InputError("nothing in the circle stands out of the wall", "outline")
-    sectors = _sectors(patch, found)
-    left_out = np.array([_size(_fit(patch, found, sectors != k)) for k in np.unique(sectors)])
+    sectors = _sectors(patch, parameters)
+    left_out = np.array([_size(_fit(patch, parameters, sectors != k)) for k in np.unique(sectors)])
     n = len(left_out)
     points = float(np.sqrt((n - 1) / n * np.sum((left_out - np.mean(left_out)) ** 2)))
-    shifts = [_size(_fit(patch, found, every, mode)) - size for mode in patch.modes.T]
+    shifts = [_size(_fit(patch, parameters, every, mode)) - size for mode in patch.modes.T]
     calibration, unit = float(np.linalg.norm(shifts)), size * scale_std_percent / 100
     std = float(np.sqrt(points**2 + calibration**2 + unit**2))
     # Welch and Satterthwaite: the jackknife's part is known from few sectors alone.
@@ -189,12 +189,12 @@ def _fit(
     scale = np.array([*np.full(5, length), 1, 1, *np.full(3, 1 / length), 1]) * 0.1
     low, high = np.full(11, -np.inf), np.full(11, np.inf)
     low[0], (low[10], high[10]) = 0.1 * length, _FOOT
-    found = least_squares(
+    optimum = least_squares(
         lambda p: _residuals(p, points, noise), np.clip(start, low + 1e-9, high - 1e-9),
         loss="cauchy", f_scale=1.5, x_scale=scale, bounds=(low, high), max_nfev=80,
         xtol=1e-5, ftol=1e-6,
     )  # fmt: skip
-    return found.x
+    return optimum.x
 
 
 def _residuals(p: Floats, points: Floats, noise: Floats) -> Floats:

@@ -20,7 +20,7 @@ SCALE_ERRORS = ("scale_error_percent", "scale_worst_percent")
 
 
 def evaluate_sequence(
-    found: TrackedFrames, truth: Solution, true_surface: SurfaceEstimate | None
+    tracked: TrackedFrames, truth: Solution, true_surface: SurfaceEstimate | None
 ) -> SequenceMetrics:
     """Compare poses, surface and intervals with the truth.
 
@@ -29,30 +29,30 @@ def evaluate_sequence(
     all lengths with the alignment.
 
     Args:
-        found: of a sequence.
+        tracked: of a sequence.
         truth: exact poses of its frames; the world is the first frame's camera, mm.
         true_surface: in this world; None leaves the surface out.
 
     Raises:
         InputError: fewer than three frames of the truth were placed, or a frame is not in it.
     """
-    rows = found.placed
+    rows = tracked.placed
     true = _true_poses(rows, truth)
     if len(rows) < 3:
         raise InputError(
             f"{len(rows)} frames with a pose", "result", "at least three are needed to align them"
         )
     ours = PosePairs(rows, true)
-    in_mm = found.solution.units == "mm"
+    in_mm = tracked.solution.units == "mm"
     by = trajectory_alignment(ours.found, ours.true, "rigid" if in_mm else "similarity")
     aligned = absolute_trajectory_error(ours.found, ours.true, by)
-    views = TrackedViews(found, ours, truth, true_surface)
-    lost = sum(bool(row.lost) for row in found.rows)
-    focal = focal_error(found.solution.projector.focal, truth.projector.focal)
+    views = TrackedViews(tracked, ours, truth, true_surface)
+    lost = sum(bool(row.lost) for row in tracked.rows)
+    focal = focal_error(tracked.solution.projector.focal, truth.projector.focal)
     return SequenceMetrics(
-        frames=len(found.rows),
+        frames=len(tracked.rows),
         lost=lost,
-        other_parts=len(found.rows) - lost - len(rows),
+        other_parts=len(tracked.rows) - lost - len(rows),
         ate_aligned_rms_mm=root_mean_square(aligned),
         ate_aligned_max_mm=float(aligned.max()),
         ate_first_rms_mm=ours.first_error() if in_mm else None,

@@ -60,8 +60,8 @@ class TrackedViews:
         few = rng.choice(len(vertices), min(VERTICES, len(vertices)), replace=False)
         true = self._pair.true_base.apply(self._true.vertices)
         off, first = (distance_to_mesh(v[few], true, self._true.faces) for v in (vertices, plain))
-        seen = np.concatenate([self._seen(k, rng) for k in self._chosen])
-        near = distance_to_mesh(seen, vertices, self._surface.faces) <= NEAR
+        visible_points = np.concatenate([self._seen(k, rng) for k in self._chosen])
+        near = distance_to_mesh(visible_points, vertices, self._surface.faces) <= NEAR
         values = (root_mean_square(off), float(np.median(off)), 100 * float(near.mean()))
         return {
             **dict(zip(names, values, strict=True)),
@@ -75,28 +75,28 @@ class TrackedViews:
         if self._surface.std is None:
             return None
         std = self._surface.std[vertices]
-        known = np.isfinite(std)
-        return 100 * float((off < INTERVAL * std)[known].mean()) if known.any() else None
+        finite = np.isfinite(std)
+        return 100 * float((off < INTERVAL * std)[finite].mean()) if finite.any() else None
 
     def depth(self) -> list[FrameDepth]:
         """Return of some frames how the depth of their pixels differs."""
         if self._surface is None or self._true is None:
             return []
-        found = RayCaster(self._surface.vertices, self._surface.faces)
+        caster = RayCaster(self._surface.vertices, self._surface.faces)
         out = []
         for k in self._chosen:
             row, rays = self._pair.rows[k], self._camera.grid_rays.reshape(-1, 3)
             pose = row.world_from_camera
             assert pose is not None
             scale = self._by.scale
-            depth = scale * found.range(pose.t, pose.rotate(rays)) * rays[:, 2]
+            depth = scale * caster.range(pose.t, pose.rotate(rays)) * rays[:, 2]
             lit = np.isfinite(self._view(k)[0].reshape(-1, 2)).all(-1)
             off = np.abs(depth - self._view(k)[1].reshape(-1, 3)[:, 2])[lit]
-            known = off[np.isfinite(off)]
+            finite = off[np.isfinite(off)]
             out.append(FrameDepth(
                 name=row.name,
-                median_mm=float(np.median(known)) if len(known) else None,
-                covered_percent=100 * len(known) / max(len(off), 1),
+                median_mm=float(np.median(finite)) if len(finite) else None,
+                covered_percent=100 * len(finite) / max(len(off), 1),
             ))  # fmt: skip
         return out
 
@@ -108,8 +108,8 @@ class TrackedViews:
         as far as the surface, take part.
         """
         assert self._surface is not None
-        found = self._pair.base.apply(self._surface.vertices)
-        reach = float(np.median(np.linalg.norm(found, axis=1)))
+        vertices = self._pair.base.apply(self._surface.vertices)
+        reach = float(np.median(np.linalg.norm(vertices, axis=1)))
         length = reach if self._in_mm else self._scaled(reach)
         ours = np.concatenate([_marks(pose, reach) for pose in self._pair.found])
         theirs = np.concatenate([_marks(pose, length) for pose in self._pair.true])
@@ -130,10 +130,10 @@ class TrackedViews:
         if k not in self._views:
             pose = self._pair.true_base.inverse() @ self._pair.true[k]
             projector, size = self._light
-            seen = self._scene.view(
+            view = self._scene.view(
                 self._camera, pose, projector, self._pair.true_projector[k], size
             )
-            self._views[k] = seen.q, seen.points
+            self._views[k] = view.q, view.points
         return self._views[k]
 
     @cached_property
@@ -143,9 +143,9 @@ class TrackedViews:
 
     @cached_property
     def _light(self) -> tuple[ProjectorModel, tuple[int, int]]:
-        known = model_and_size(self._truth.projector)
-        assert known is not None
-        return known
+        light = model_and_size(self._truth.projector)
+        assert light is not None
+        return light
 
     @cached_property
     def _scene(self) -> "MeshScene":

@@ -85,14 +85,14 @@ def compare_shape(
     true_range = range_image(truth_caster, camera)
     vertices = similarity.apply(solution.vertices)
     distance = distance_to_mesh(vertices[np.unique(solution.faces)], truth.vertices, truth.faces)
-    found = range_image(RayCaster(vertices, solution.faces), camera)
-    difference = (found - true_range)[np.isfinite(found) & np.isfinite(true_range)]
+    ranges = range_image(RayCaster(vertices, solution.faces), camera)
+    difference = (ranges - true_range)[np.isfinite(ranges) & np.isfinite(true_range)]
     wanted = _reached(truth_caster, true_range, camera, lighting)
     return ShapeErrors(
         rmse=root_mean_square(distance),
         median=float(np.median(distance)),
         ray_rmse=root_mean_square(difference) if len(difference) else None,
-        coverage=float(np.isfinite(found[wanted]).mean()) if wanted.any() else None,
+        coverage=float(np.isfinite(ranges[wanted]).mean()) if wanted.any() else None,
         alignment_scale=similarity.scale,
     )
 
@@ -106,13 +106,13 @@ def alignment_of(
     """
     if alignment == "none":
         return Similarity.identity()
-    found, true = (range_image(RayCaster(s.vertices, s.faces), camera) for s in (solution, truth))
-    both = np.isfinite(found) & np.isfinite(true)
+    ranges, true = (range_image(RayCaster(s.vertices, s.faces), camera) for s in (solution, truth))
+    both = np.isfinite(ranges) & np.isfinite(true)
     if np.count_nonzero(both) < 3:
         return "no camera ray meets both surfaces, so they cannot be aligned"
     rays = camera.grid_rays[both]
     return align_robustly(
-        rays * found[both, None], rays * true[both, None],
+        rays * ranges[both, None], rays * true[both, None],
         scale=alignment != "rigid", rotation=alignment != "scale",
     )  # fmt: skip
 
@@ -121,10 +121,10 @@ def _reached(
     truth: RayCaster, true_range: Floats, camera: CameraModel, lighting: Lighting | None
 ) -> NDArray[np.bool_]:
     """Return the (H, W) pixels whose true point the projector lights."""
-    seen = np.isfinite(true_range)
+    visible = np.isfinite(true_range)
     if lighting is None:
-        return seen
-    points = camera.grid_rays[seen] * true_range[seen, None]
+        return visible
+    points = camera.grid_rays[visible] * true_range[visible, None]
     q = lighting.projector.project(lighting.projector_from_camera.apply(points))
     on_pattern = ((q >= -0.5) & (q <= np.array(lighting.size) - 0.5)).all(-1)
     centre = lighting.projector_from_camera.inverse().t
@@ -133,6 +133,6 @@ def _reached(
     first = truth.range(centre, towards / length[:, None])
     # A miss is a point on the rim of the mesh that rounding let pass.
     shadowed = first < length * (1 - _SHADOW_TOLERANCE)
-    lit = seen.copy()
-    lit[seen] = on_pattern & ~shadowed
+    lit = visible.copy()
+    lit[visible] = on_pattern & ~shadowed
     return lit

@@ -73,10 +73,10 @@ def _one(
         return "the true camera pose of the solution's first frame is null"
     if path is None or camera is None:
         return truths.without_surface
-    found, true = load_surface(file), load_surface(path)
+    surface, true = load_surface(file), load_surface(path)
     true = SurfaceEstimate(moved.apply(true.vertices), true.faces)
     lighting = _lighting(truths.record, truths.record.frames[index])
-    return compare_shape(found, true, camera.to_model(), lighting, alignment)
+    return compare_shape(surface, true, camera.to_model(), lighting, alignment)
 
 
 def camera_from_surface(truths: Truths, index: int) -> RigidTransform | None:
@@ -96,5 +96,5 @@ def _lighting(truth: Solution, frame: Frame) -> Lighting | None:
     projector = truth.projector
     if frame.focal is not None:
         projector = projector.model_copy(update={"focal": frame.focal})
-    known, pose = model_and_size(projector), frame.projector_from_camera.to_transform()
-    return None if known is None or pose is None else Lighting(*known, pose)
+    light, pose = model_and_size(projector), frame.projector_from_camera.to_transform()
+    return None if light is None or pose is None else Lighting(*light, pose)

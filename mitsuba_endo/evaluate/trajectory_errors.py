@@ -18,14 +18,14 @@ Floats = NDArray[np.float64]
 
 
 def trajectory_alignment(
-    found: Sequence[RigidTransform],
+    poses: Sequence[RigidTransform],
     true: Sequence[RigidTransform],
     alignment: Literal["none", "rigid", "similarity"],
 ) -> Similarity:
     """Return what takes the found positions to the true ones best, after Umeyama.
 
     Args:
-        found: world_from_camera of every frame.
+        poses: world_from_camera of every frame.
         true: the same of the truth, whose world may be another one.
         alignment: nothing, a rigid motion, or one with a scale.
 
@@ -34,18 +34,18 @@ def trajectory_alignment(
     """
     if alignment == "none":
         return Similarity.identity()
-    return align(_positions(found), _positions(true), scale=alignment == "similarity")
+    return align(_positions(poses), _positions(true), scale=alignment == "similarity")
 
 
 def absolute_trajectory_error(
-    found: Sequence[RigidTransform], true: Sequence[RigidTransform], by: Similarity
+    poses: Sequence[RigidTransform], true: Sequence[RigidTransform], by: Similarity
 ) -> Floats:
     """Return the distance (N,) of every position from the true one after an alignment."""
-    return np.linalg.norm(by.apply(_positions(found)) - _positions(true), axis=1)
+    return np.linalg.norm(by.apply(_positions(poses)) - _positions(true), axis=1)
 
 
 def relative_pose_error(
-    found: Sequence[RigidTransform], true: Sequence[RigidTransform], apart: int = 1
+    poses: Sequence[RigidTransform], true: Sequence[RigidTransform], apart: int = 1
 ) -> tuple[Floats, Floats]:
     """Return errors of the motions between frames that are ``apart`` frames apart.
 
@@ -55,8 +55,8 @@ def relative_pose_error(
         Lengths of the errors' translations, the unit of length, and their angles, radians; (N,).
     """
     shift, turn = [], []
-    for i in range(len(found) - apart):
-        motion = found[i].inverse() @ found[i + apart]
+    for i in range(len(poses) - apart):
+        motion = poses[i].inverse() @ poses[i + apart]
         wanted = true[i].inverse() @ true[i + apart]
         error = wanted.inverse() @ motion
         shift.append(np.linalg.norm(error.t))

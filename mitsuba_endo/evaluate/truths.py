@@ -96,10 +96,10 @@ def truths_of(record: Solution, folder: str | Path | None, several: bool = False
     images = () if folder is None else tuple(n for n in _IMAGES if is_file(folder / n))
     names = [(f.name, *(images if len(record.frames) == 1 else ())) for f in record.frames]
     if several and folder is not None:
-        names = [tuple(f"{folder.name}/{name}" for name in known) for known in names]
+        names = [tuple(f"{folder.name}/{name}" for name in aliases) for aliases in names]
     frames = [
-        f.model_copy(update={"name": known[0]})
-        for f, known in zip(record.frames, names, strict=True)
+        f.model_copy(update={"name": aliases[0]})
+        for f, aliases in zip(record.frames, names, strict=True)
     ]
     return Truths(
         record.model_copy(update={"frames": frames, "surface": None}), names,

@@ -49,16 +49,16 @@ class _Number:
 
 
 def _compared(
-    of: _Number, found: float | None, true: float | None, std: float | None,
+    of: _Number, value: float | None, true: float | None, std: float | None,
     error: float | None = None,
 ) -> ComparedValue:  # fmt: skip
-    if error is None and found is not None and true is not None:
-        error = found - true
-    known = std is not None and std > 0 and of.status not in _GIVEN and error is not None
-    std = std if known else None
+    if error is None and value is not None and true is not None:
+        error = value - true
+    has_std = std is not None and std > 0 and of.status not in _GIVEN and error is not None
+    std = std if has_std else None
     half = None if std is None else INTERVAL * std
     return ComparedValue(
-        group=of.group, quantity=of.quantity, unit=of.unit, found=found, true=true, error=error,
+        group=of.group, quantity=of.quantity, unit=of.unit, found=value, true=true, error=error,
         std=std, interval=half, deviations=None if std is None or error is None else error / std,
         inside=None if half is None or error is None else abs(error) <= half,
         status=of.status, reason=of.reason,
@@ -100,13 +100,13 @@ def _factor(pose: PoseEstimate) -> float:
 
 
 def _projector(solution: Solution, truth: Solution) -> Iterator[ComparedValue]:
-    found, true = solution.projector, truth.projector
+    projector, true = solution.projector, truth.projector
     per_frame = any(f.focal is not None for s in (solution, truth) for f in s.frames)
     if not per_frame:
-        yield from _estimates("projector", "focal length", "px", found.focal, true.focal)
-    yield from _estimates("projector", "centre", "px", found.centre, true.centre)
-    yield from _estimates("projector", "aspect", "", found.aspect, true.aspect)
-    yield from _estimates("projector", "distortion", "", found.distortion, true.distortion)
+        yield from _estimates("projector", "focal length", "px", projector.focal, true.focal)
+    yield from _estimates("projector", "centre", "px", projector.centre, true.centre)
+    yield from _estimates("projector", "aspect", "", projector.aspect, true.aspect)
+    yield from _estimates("projector", "distortion", "", projector.distortion, true.distortion)
 
 
 def _focal(solution: Solution, truth: Solution, pair: Pair) -> Iterator[ComparedValue]:
@@ -118,11 +118,11 @@ def _camera(solution: Solution, truth: Solution) -> Iterator[ComparedValue]:
     """Yield the camera's intrinsics where both sides have one of the same model."""
     if solution.camera is None or truth.camera is None:
         return
-    found, true = solution.camera.to_model(), truth.camera.to_model()
-    if found.model != true.model:
+    camera, true = solution.camera.to_model(), truth.camera.to_model()
+    if camera.model != true.model:
         return
-    K = [(np.diag(c.K)[:2].tolist(), c.K[:2, 2].tolist()) for c in (found, true)]
-    lens = [[float(v) for v in c.distortion] for c in (found, true)]
+    K = [(np.diag(c.K)[:2].tolist(), c.K[:2, 2].tolist()) for c in (camera, true)]
+    lens = [[float(v) for v in c.distortion] for c in (camera, true)]
     for name, quantity, unit, value, exact in (
         ("camera_focal", "focal length", "px", K[0][0], K[1][0]),
         ("camera_centre", "centre", "px", K[0][1], K[1][1]),
@@ -135,14 +135,14 @@ def _camera(solution: Solution, truth: Solution) -> Iterator[ComparedValue]:
 
 
 def _estimates(
-    group: str, quantity: str, unit: str, found: Estimate, true: Estimate
+    group: str, quantity: str, unit: str, estimate: Estimate, true: Estimate
 ) -> Iterator[ComparedValue]:
-    values, exact, stds = (_listed(v) for v in (found.value, true.value, found.std))
+    values, exact, stds = (_listed(v) for v in (estimate.value, true.value, estimate.std))
     count = max(len(values), len(exact))
     lens = quantity == "distortion"
     for i in range(count):
         part = "" if count == 1 and not lens else f" {'xy'[i] if not lens and i < 2 else i + 1}"
-        of = _Number(group, quantity + part, unit, found.status, found.reason)
+        of = _Number(group, quantity + part, unit, estimate.status, estimate.reason)
         yield _compared(of, _at(values, i, lens), _at(exact, i, lens), _at(stds, i, False))
 
 
@@ -164,22 +164,22 @@ def _pose(
     gives_scale: bool = False,
 ) -> Iterator[ComparedValue]:
     """Yield rotation, translation and, of a projector, the baseline."""
-    found, true = poses[0].to_transform(), poses[1].to_transform()
+    pose, true = poses[0].to_transform(), poses[1].to_transform()
     status, reason = poses[0].status, poses[0].reason
-    if found is None or true is None:
-        why = reason if found is None else "the true pose is not known"
+    if pose is None or true is None:
+        why = reason if pose is None else "the true pose is not known"
         yield _compared(_Number(group, f"{of} pose", "", status, why), None, None, None)
         return
     std = np.array(poses[0].std or [np.nan] * 6)
-    turned = np.degrees(Rotation.from_matrix(found.R @ true.R.T).as_rotvec())
-    angles = [np.degrees(Rotation.from_matrix(p.R).as_rotvec()) for p in (found, true)]
+    turned = np.degrees(Rotation.from_matrix(pose.R @ true.R.T).as_rotvec())
+    angles = [np.degrees(Rotation.from_matrix(p.R).as_rotvec()) for p in (pose, true)]
     for i, axis in enumerate(_AXES):
         number = _Number(group, f"{of} rotation {axis}", "deg", status, reason)
         s = float(np.degrees(std[i]))
         yield _compared(
             number, float(angles[0][i]), float(angles[1][i]), _known(s), float(turned[i])
         )
-    t = [p.t * f for p, f in zip((found, true), factors, strict=True)]
+    t = [p.t * f for p, f in zip((pose, true), factors, strict=True)]
     for i, axis in enumerate(_AXES):
         number = _Number(group, f"{of} translation {axis}", unit, status, reason)
         spread = _known(float(std[3 + i] * factors[0]))
@@ -200,8 +200,8 @@ def _camera_motion(
     first: Pair, pair: Pair, factors: Sequence[float], unit: str
 ) -> Iterator[ComparedValue]:
     """Yield a camera's pose beside the true motion since the first frame, in the found world."""
-    found = pair[0].world_from_camera
-    if found.status in _GIVEN:
+    estimate = pair[0].world_from_camera
+    if estimate.status in _GIVEN:
         return  # an input, or of a frame that shares no surface with the first
     start = first[0].world_from_camera.to_transform()
     true, placed = (f.world_from_camera.to_transform() for f in (first[1], pair[1]))
@@ -209,4 +209,4 @@ def _camera_motion(
     if start is not None and true is not None and placed is not None:
         world = RigidTransform(start.R, start.t * factors[0] / factors[1])
         exact = PoseEstimate.of(world @ true.inverse() @ placed)
-    yield from _pose(pair[0].name, "camera", (found, exact), factors, unit)
+    yield from _pose(pair[0].name, "camera", (estimate, exact), factors, unit)
