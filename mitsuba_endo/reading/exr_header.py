@@ -38,7 +38,7 @@ class Header:
     channels: int
     sample_bytes: int
     """Bytes of one pixel, all channels."""
-    place: tuple[int, int]
+    offset: tuple[int, int]
     """Row and column of the first pixel in the picture that the file shows."""
     shown: tuple[int, int]
     """Rows and columns of that picture."""
@@ -82,8 +82,8 @@ def _holds(header: Header, size: int) -> bool:
     raw = header.width * header.height * header.sample_bytes
     if header.compression < len(_RATIO) and raw > _RATIO[header.compression] * (size + _SLACK):
         return False
-    known = header.compression < len(_LINES)
-    chunks = -(-header.height // (_LINES[header.compression] if known else max(_LINES)))
+    listed = header.compression < len(_LINES)
+    chunks = -(-header.height // (_LINES[header.compression] if listed else max(_LINES)))
     return header.tiled or chunks * _CHUNK <= size
 
 
@@ -93,44 +93,46 @@ def _parse(data: bytes) -> tuple[Header, ...]:
         raise ValueError("no picture")
     at, headers = 8, []
     while True:
-        found, at = _attributes(data, at)
-        headers.append(_header(found, tiled=bool(version & _TILED)))
+        attributes, at = _attributes(data, at)
+        headers.append(_header(attributes, tiled=bool(version & _TILED)))
         # Of several parts, an empty header ends the list.
         if not version & _PARTS or not data[at]:
             return tuple(headers)
 
 
-def _header(found: dict[str, bytes], *, tiled: bool) -> Header:
-    kind = found.get("type", b"")
+def _header(attributes: dict[str, bytes], *, tiled: bool) -> Header:
+    kind = attributes.get("type", b"")
     if kind.startswith(b"deep"):
         raise ValueError("no picture")
-    left, top, right, bottom = struct.unpack("<4i", found["dataWindow"])
+    left, top, right, bottom = struct.unpack("<4i", attributes["dataWindow"])
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1:
         raise ValueError("no pixels")
-    x, y, x_last, y_last = struct.unpack("<4i", found.get("displayWindow", found["dataWindow"]))
-    bytes_, samplings = _channels(found["channels"])
+    x, y, x_last, y_last = struct.unpack(
+        "<4i", attributes.get("displayWindow", attributes["dataWindow"])
+    )
+    bytes_, samplings = _channels(attributes["channels"])
     return Header(
         width, height, len(bytes_), sum(bytes_), (top - y, left - x),
-        (max(1, y_last - y + 1), max(1, x_last - x + 1)), found["compression"][0],
+        (max(1, y_last - y + 1), max(1, x_last - x + 1)), attributes["compression"][0],
         tiled or kind.startswith(b"tiled"), any(s != (1, 1) for s in samplings),
     )  # fmt: skip
 
 
 def _attributes(data: bytes, at: int) -> tuple[dict[str, bytes], int]:
     """Return a header's attributes and where it ends."""
-    found = {}
+    attributes = {}
     while data[at]:
         name, at = _text(data, at)
         _, at = _text(data, at)
         (length,) = struct.unpack_from("<i", data, at)
         if length < 0 or at + 4 + length > len(data):
             raise ValueError("cut short")
-        found[name] = data[at + 4 : at + 4 + length]
+        attributes[name] = data[at + 4 : at + 4 + length]
         at += 4 + length
-    if not {"dataWindow", "compression", "channels"} <= found.keys():
+    if not {"dataWindow", "compression", "channels"} <= attributes.keys():
         raise ValueError("an attribute is missing")
-    return found, at + 1
+    return attributes, at + 1
 
 
 def _channels(data: bytes) -> tuple[list[int], list[tuple[int, int]]]:

@@ -96,8 +96,8 @@ def _words(data: bytes) -> Iterator[bytes]:
 
 
 def _tiff(data: bytes) -> tuple[int, int]:
-    found = next(directories(data))
-    return found.get(WIDTH, 0), found.get(HEIGHT, 0)
+    tags = next(directories(data))
+    return tags.get(WIDTH, 0), tags.get(HEIGHT, 0)
 
 
 def _webp(data: bytes) -> tuple[int, int]:

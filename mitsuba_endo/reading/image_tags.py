@@ -28,10 +28,10 @@ TURNED: dict[int, tuple[str, Callable[[NDArray[np.integer]], NDArray[np.integer]
 def orientation(data: bytes) -> int:
     """Return EXIF's orientation of an image, 1 to 8; 1 if it has none."""
     try:
-        found = next(directories(_exif(data)), {}).get(ORIENTATION, 1)
+        code = next(directories(_exif(data)), {}).get(ORIENTATION, 1)
     except (struct.error, IndexError):
         return 1
-    return found if found in TURNED else 1
+    return code if code in TURNED else 1
 
 
 def image_count(data: bytes) -> int:

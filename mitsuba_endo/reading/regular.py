@@ -95,17 +95,17 @@ def regular(path: str | Path, kind: SizeLimit, missing: str = "no such file",
         InputError: it is missing, not regular, unreadable, or too large for its kind.
     """
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except (FileNotFoundError, NotADirectoryError):
         raise InputError(missing, str(path), todo) from None
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
-    if stat.S_ISDIR(found.st_mode):
+    if stat.S_ISDIR(status.st_mode):
         raise InputError("is a folder", str(path), "give a file")
-    if not stat.S_ISREG(found.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         raise InputError("is a pipe or a device", str(path), "give a regular file")
-    kind.check(found.st_size, path)
-    return found.st_size
+    kind.check(status.st_size, path)
+    return status.st_size
 
 
 def read_bytes(path: str | Path, kind: SizeLimit, missing: str = "no such file",

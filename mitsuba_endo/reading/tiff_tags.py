@@ -26,16 +26,16 @@ def directories(data: bytes) -> Iterator[dict[int, int]]:
     """
     order = "<" if data[:2] == b"II" else ">"
     (at,) = struct.unpack(f"{order}I", data[4:8])
-    seen: set[int] = set()
-    while at and at not in seen and len(seen) < _MOST:
-        seen.add(at)
+    offsets: set[int] = set()
+    while at and at not in offsets and len(offsets) < _MOST:
+        offsets.add(at)
         (count,) = struct.unpack(f"{order}H", data[at : at + 2])
         end = at + 2 + 12 * count
-        found: dict[int, int] = {}
+        tags: dict[int, int] = {}
         for entry in range(at + 2, end, 12):
             tag, kind, number = struct.unpack(f"{order}HHI", data[entry : entry + 8])
             form = f"{order}{_FORMS.get(kind, 'B')}"
             if number == 1 and kind in _FORMS:
-                (found[tag],) = struct.unpack_from(form, data[entry + 8 : entry + 12])
-        yield found
+                (tags[tag],) = struct.unpack_from(form, data[entry + 8 : entry + 12])
+        yield tags
         (at,) = struct.unpack(f"{order}I", data[end : end + 4])

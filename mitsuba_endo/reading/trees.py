@@ -129,13 +129,13 @@ def check_tree(data: Any, source: str) -> None:
         InputError: names the source and the place.
     """
     waiting: list[tuple[Any, tuple[str, ...]]] = [(data, ())]
-    seen = 0
+    count = 0
     while waiting:
         value, at = waiting.pop()
-        seen += 1
+        count += 1
         if len(at) > DEEPEST:
             raise InputError(f"is nested more than {DEEPEST} deep", source, "make it flatter")
-        if seen > MOST:
+        if count > MOST:
             raise InputError(f"holds more than {MOST} values", source, "make it smaller")
         if isinstance(value, dict):
             waiting += [(v, (*at, str(k))) for k, v in value.items()]

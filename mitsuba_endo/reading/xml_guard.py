@@ -28,14 +28,14 @@ def read_xml(path: str | Path, missing: str = "no such file") -> ET.Element:
 
 
 def _check(data: bytes) -> None:
-    depth = seen = 0
+    depth = count = 0
 
     def begin(name: str, attributes: object) -> None:
-        nonlocal depth, seen
-        depth, seen = depth + 1, seen + 1
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
         if depth > DEEPEST:
             raise ValueError(f"more than {DEEPEST} elements in each other")
-        if seen > MOST:
+        if count > MOST:
             raise ValueError(f"more than {MOST} elements")
 
     def end(name: str) -> None:

@@ -26,13 +26,13 @@ def as_maps(maps: Iterable[CorrespondenceMap]) -> list[CorrespondenceMap]:
         raise InputError(
             f"is {shown(type(maps).__name__)} and no list", "maps", "give [load_map(path), ...]"
         )
-    found = list(maps)
-    for k, map_ in enumerate(found):
+    correspondences = list(maps)
+    for k, map_ in enumerate(correspondences):
         if not isinstance(map_, CorrespondenceMap):
             what = f"is {shown(type(map_).__name__)} and no map"
             raise InputError(what, f"maps[{k}]", "give [load_map(path), ...]")
         _check_arrays(map_)
-    return found
+    return correspondences
 
 
 def _check_arrays(map_: CorrespondenceMap) -> None:
@@ -45,8 +45,8 @@ def _check_arrays(map_: CorrespondenceMap) -> None:
             form = getattr(covariance, "shape", type(covariance).__name__)
             what = f"covariance is {form}, not (H, W, 3) numbers"
             raise InputError(what, f"{map_.name}: map", "mend it")
-        known = np.where(map_.valid[..., None], covariance, np.nan)
-        check_covariance(known, q, f"{map_.name}: map")
+        valid_covariance = np.where(map_.valid[..., None], covariance, np.nan)
+        check_covariance(valid_covariance, q, f"{map_.name}: map")
     if weight is None:
         return
     if not _is_numbers(weight) or weight.shape != q.shape[:2]:
@@ -137,20 +137,20 @@ def _check_units(map_: CorrespondenceMap, rig: Rig) -> None:
 
 
 def _check_known_distance(maps: Sequence[CorrespondenceMap], rig: Rig) -> None:
-    known = rig.scale.known_distance
-    if known is None:
+    distance = rig.scale.known_distance
+    if distance is None:
         return
-    if known.frame >= len(maps):
+    if distance.frame >= len(maps):
         raise InputError(
-            f"frame {known.frame} does not exist, {len(maps)} maps are given and counted from 0",
+            f"frame {distance.frame} does not exist, {len(maps)} maps are given and counted from 0",
             "scale.known_distance.frame",
             "name a frame that is given",
         )
     limits = np.array([rig.camera.width, rig.camera.height]) - 0.5
-    pixels = np.array(known.pixels)
+    pixels = np.array(distance.pixels)
     if not ((pixels >= -0.5) & (pixels <= limits)).all():
         raise InputError(
-            f"the points {known.pixels} do not both lie in the camera's image",
+            f"the points {distance.pixels} do not both lie in the camera's image",
             "scale.known_distance.pixels",
             "give two (x, y) in camera pixels",
         )

@@ -68,17 +68,17 @@ def load_map(
     read = READERS[path.suffix.lower()](path, convention.channels)
     q, covariance = convention.coordinates(read.q, size), read.covariance
     weight = None if read.weight is None else convention.upright(read.weight)
-    known = np.asarray(np.isfinite(q).all(-1))
+    valid = np.asarray(np.isfinite(q).all(-1))
     if covariance is not None:
         check_covariance(covariance, read.q, str(path))
         covariance = convention.covariance(covariance, size)
-        known &= np.isfinite(covariance).all(-1)
+        valid &= np.isfinite(covariance).all(-1)
         weight = relative_weight(covariance) if weight is None else weight
     if weight is not None:
         _check_weight(weight, q, str(path))
-        known &= weight > 0
+        valid &= weight > 0
     _check_correlation(read.correlation_px, str(path))
-    q = np.where(known[..., None], q, np.float32(np.nan))
+    q = np.where(valid[..., None], q, np.float32(np.nan))
     _check(q, str(path))
     return CorrespondenceMap(q, path.name, weight, covariance, read.correlation_px)
 
@@ -107,11 +107,11 @@ def frame_names(paths: Sequence[Path]) -> list[str]:
 def relative_weight(covariance: NDArray[np.floating]) -> NDArray[np.float32]:
     """Return 1 / mean variance (H, W), relative to the best, of (H, W, 3); NaN gives 0."""
     variance = (covariance[..., 0] + covariance[..., 2]) / 2
-    known = np.isfinite(variance)
-    if not known.any():
+    finite = np.isfinite(variance)
+    if not finite.any():
         return np.zeros(variance.shape, np.float32)
-    best = np.min(variance[known])
-    weight = np.where(known, best / np.where(known, variance, 1), 0)
+    best = np.min(variance[finite])
+    weight = np.where(finite, best / np.where(finite, variance, 1), 0)
     return np.asarray(weight, np.float32)
 
 
@@ -208,10 +208,10 @@ def _check_weight(weight: NDArray[np.float32], q: NDArray[np.float32], source: s
             f"weight has shape {weight.shape} and the map {q.shape[:2]}", source,
             "give one weight for each pixel",
         )  # fmt: skip
-    known = weight[~np.isnan(weight)]
-    if known.size and not (known.min() >= 0 and known.max() <= 1):
+    given = weight[~np.isnan(weight)]
+    if given.size and not (given.min() >= 0 and given.max() <= 1):
         raise InputError(
-            f"weights reach from {known.min():g} to {known.max():g}", source,
+            f"weights reach from {given.min():g} to {given.max():g}", source,
             "divide 1 / variance by its largest value, so that weights lie between 0 and 1",
         )  # fmt: skip
 

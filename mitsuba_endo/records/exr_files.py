@@ -68,13 +68,13 @@ def open_exr(path: str | Path) -> ExrFile:
 
 def _placed(pixels: NDArray[np.float32], header: Header) -> NDArray[np.float32]:
     """Return the pixels where the picture shows them: writers cut off empty borders."""
-    if header.place == (0, 0) and header.shown == pixels.shape:
+    if header.offset == (0, 0) and header.shown == pixels.shape:
         return pixels
     whole = np.full(header.shown, np.float32(np.nan))
-    (row, column), (height, width) = header.place, pixels.shape
-    seen = whole[max(0, row) : max(0, row + height), max(0, column) : max(0, column + width)]
+    (row, column), (height, width) = header.offset, pixels.shape
+    window = whole[max(0, row) : max(0, row + height), max(0, column) : max(0, column + width)]
     top, left = max(0, -row), max(0, -column)
-    seen[:] = pixels[top : top + seen.shape[0], left : left + seen.shape[1]]
+    window[:] = pixels[top : top + window.shape[0], left : left + window.shape[1]]
     return whole
 
 

@@ -53,15 +53,15 @@ def read_map_exr(path: Path, channels: tuple[str, str] | None = None) -> MapArra
         InputError: missing or damaged file, no coordinates, or several pairs.
     """
     file = open_exr(path)
-    found = file.channels
+    arrays = file.channels
     if file.lossy:
         todo = "write it without loss, e.g. with ZIP"
         raise InputError("is compressed with loss, which bends coordinates", str(path), todo)
-    names = channels or find_pair(list(found), str(path))
-    q = _stacked(found, names, str(path))
-    given = any(name in found for name in COVARIANCES)
-    covariance = _stacked(found, COVARIANCES, str(path)) if given else None
-    return MapArrays(q, found.get(WEIGHT), covariance, file.numbers.get(CORRELATION))
+    names = channels or find_pair(list(arrays), str(path))
+    q = _stacked(arrays, names, str(path))
+    given = any(name in arrays for name in COVARIANCES)
+    covariance = _stacked(arrays, COVARIANCES, str(path)) if given else None
+    return MapArrays(q, arrays.get(WEIGHT), covariance, file.numbers.get(CORRELATION))
 
 
 def read_map_npz(path: Path, channels: tuple[str, str] | None = None) -> MapArrays:
@@ -125,9 +125,9 @@ def find_pair(names: Sequence[str], source: str) -> tuple[str, str]:
     """
     if set(CHANNELS) <= set(names):
         return CHANNELS
-    found = {pair: kind for name in names for pair, kind in _pairs(name, names)}
-    own = [pair for pair, kind in found.items() if kind == "projectorx"]
-    choice = own if own else list(found)
+    pairs = {pair: kind for name in names for pair, kind in _pairs(name, names)}
+    own = [pair for pair, kind in pairs.items() if kind == "projectorx"]
+    choice = own if own else list(pairs)
     if len(choice) == 1:
         return choice[0]
     state = f"state {OPTION} channels=X/Y"
@@ -144,7 +144,7 @@ def find_pair(names: Sequence[str], source: str) -> tuple[str, str]:
 def _pairs(name: str, names: Sequence[str]) -> list[tuple[tuple[str, str], str]]:
     """Return the pairs that a name may be the x of, with what they are called."""
     parts = name.split(".")
-    found = []
+    pairs = []
     for count in (1, 2):
         layer, kind = parts[:-count], _plain("".join(parts[-count:]))
         partners = [
@@ -155,8 +155,8 @@ def _pairs(name: str, names: Sequence[str]) -> list[tuple[tuple[str, str], str]]
         # Three are a vector of space: a normal, a position.
         vector = kind[-1:] == "x" and any(_plain(o) == f"{_plain(name)[:-1]}z" for o in names)
         if len(partners) == 1 and not vector:
-            found.append(((name, partners[0]), kind))
-    return found
+            pairs.append(((name, partners[0]), kind))
+    return pairs
 
 
 def _plain(name: str) -> str:

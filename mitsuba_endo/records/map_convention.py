@@ -128,11 +128,11 @@ def read_map_convention(text: str) -> MapConvention:
             missing.append(float(str(value)))
         elif parts.setdefault(name, value) != value:
             raise InputError(f"{shown(word)} contradicts another word", OPTION, "state one of both")
-    found = replace(AS_STORED, missing=tuple(missing), **parts)  # type: ignore[arg-type]
-    if found.signed and not found.origin.startswith("normalised"):
+    convention = replace(AS_STORED, missing=tuple(missing), **parts)  # type: ignore[arg-type]
+    if convention.signed and not convention.origin.startswith("normalised"):
         todo = "add normalised or normalised-centres"
         raise InputError("'signed' is for normalised coordinates", OPTION, todo)
-    return found
+    return convention
 
 
 def _stated(word: str) -> tuple[str, object]:

@@ -72,10 +72,10 @@ def load_objects(path: str | Path, what: str, todo: str) -> dict[str, Any]:
         if tree["format"] != FORMAT:
             raise ValueError
         check_seal(data, todo)
-        found = _Reader(data).value(tree["roots"])
-        if not isinstance(found, dict):
+        objects = _Reader(data).value(tree["roots"])
+        if not isinstance(objects, dict):
             raise ValueError
-        return found
+        return objects
 
 
 class _Writer:
@@ -176,12 +176,12 @@ def _class(name: object) -> type:
     if module.partition(".")[0] != PACKAGE or module.endswith("__main__"):
         raise ValueError
     try:
-        found = getattr(import_module(module), own)
+        cls = getattr(import_module(module), own)
     except (ImportError, AttributeError):
         raise ValueError from None
-    if not (isinstance(found, type) and found.__module__ == module):
+    if not (isinstance(cls, type) and cls.__module__ == module):
         raise ValueError
-    return found
+    return cls
 
 
 def _generator(_reader: _Reader, content: Any) -> np.random.Generator:

@@ -40,8 +40,8 @@ def check_seal(data: Arrays, todo: str) -> None:
     """
     stored = data.get(SEAL, (_BYTES,), "u")
     # One after the other: together they may fill the memory.
-    found = seal_of((name, data.get(name, kinds="biufcU")) for name in data.names if name != SEAL)
-    if not np.array_equal(stored, found):
+    seal = seal_of((name, data.get(name, kinds="biufcU")) for name in data.names if name != SEAL)
+    if not np.array_equal(stored, seal):
         raise InputError("is not as it was written: its checksum differs", data.source, todo)
 
 

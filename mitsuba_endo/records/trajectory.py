@@ -85,7 +85,7 @@ def load_tum(path: str | Path) -> list[tuple[float, RigidTransform]]:
     Raises:
         InputError: missing file, or a line without eight numbers that make a pose.
     """
-    found = []
+    poses = []
     for number, line in enumerate(read_text(path, TABLE).splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
@@ -98,8 +98,8 @@ def load_tum(path: str | Path) -> list[tuple[float, RigidTransform]]:
             raise InputError(
                 "is not 't x y z qx qy qz qw'", f"{path}: line {number}", "mend it"
             ) from None
-        found.append((time, pose))
-    return found
+        poses.append((time, pose))
+    return poses
 
 
 def save_frames(path: str | Path, rows: Sequence[FrameRow]) -> None:

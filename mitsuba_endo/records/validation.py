@@ -85,8 +85,8 @@ def _fields_of(cls: type) -> type[BaseModel]:
 
 
 def _hints(cls: Any) -> dict[str, Any]:
-    known = get_type_hints(cls if isinstance(cls, type) else type(cls), include_extras=True)
-    return {field.name: known[field.name] for field in dataclasses.fields(cls)}
+    hints = get_type_hints(cls if isinstance(cls, type) else type(cls), include_extras=True)
+    return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
 _SYMBOLS = {"K", "R", "K_std"}  # the only capitalised keys of our files
@@ -150,7 +150,7 @@ def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for part in getattr(annotation, "__args__", ()):
-        found = _model_in(part)
-        if found is not None:
-            return found
+        model = _model_in(part)
+        if model is not None:
+            return model
     return None

@@ -52,10 +52,12 @@ def read(document: Document) -> CameraFile:
             f"the camera model '{kind}' is not known", where,
             f"calibrate with one of {', '.join(_MODELS)}",
         )  # fmt: skip
-    model, focals, places = _MODELS[kind]
-    if len(texts) != focals + 2 + len(places):
+    model, focals, coefficients = _MODELS[kind]
+    if len(texts) != focals + 2 + len(coefficients):
         raise InputError(
-            f"{kind} has {focals + 2 + len(places)} parameters, not {len(texts)}", where, "mend it"
+            f"{kind} has {focals + 2 + len(coefficients)} parameters, not {len(texts)}",
+            where,
+            "mend it",
         )
     values = numbers(texts, where)
     fx, fy = values[0], values[focals - 1]
