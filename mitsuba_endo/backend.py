@@ -133,9 +133,11 @@ def _wheel_library(stem: str) -> Path | None:
         files = importlib.metadata.files(LLVM_PACKAGE) or []
     except importlib.metadata.PackageNotFoundError:
         return None
-    found = [Path(str(f.locate())) for f in files if f.name.startswith(stem) and ".so" in f.name]
+    libraries = [
+        Path(str(f.locate())) for f in files if f.name.startswith(stem) and ".so" in f.name
+    ]
     # The versioned file is real; its symlinks appear only at the first interpreter start.
-    existing = sorted({p.resolve() for p in found if p.exists()})
+    existing = sorted({p.resolve() for p in libraries if p.exists()})
     return existing[0] if existing else None
 
 

@@ -139,10 +139,10 @@ def _check_steady(path: Path, kind: Kind) -> None:
 def _identity(path: Path) -> tuple[int, int] | None:
     """Return what tells a folder from another at the same path, None where there is none."""
     try:
-        found = path.lstat()
+        status = path.lstat()
     except (OSError, ValueError):  # no such folder, or a name that none can have
         return None
-    return found.st_ino, found.st_ctime_ns
+    return status.st_ino, status.st_ctime_ns
 
 
 def _make_parent(path: Path) -> None:

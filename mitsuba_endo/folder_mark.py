@@ -70,11 +70,11 @@ def read_mark(folder: Path) -> Mark | None:
 
 def files_in(folder: Path) -> set[str]:
     """Return every file and link below a folder but its mark, relative to it, with ``/``."""
-    found = set()
+    names = set()
     for root, folders, files in os.walk(folder, onerror=_refuse):
         links = [name for name in folders if os.path.islink(os.path.join(root, name))]
-        found |= {Path(root, name).relative_to(folder).as_posix() for name in (*files, *links)}
-    return found - {NAME}
+        names |= {Path(root, name).relative_to(folder).as_posix() for name in (*files, *links)}
+    return names - {NAME}
 
 
 def remove_marked(folder: Path, mark: Mark) -> None:

@@ -45,8 +45,10 @@ def sweep(folder: str | Path, alone: bool = False) -> list[Path]:
     over, also from other machines. An older result is moved back if the process that had moved it
     aside died before it put the new one in its place.
     """
-    found = [(path, match) for path in _entries(Path(folder)) if (match := _FORM.match(path.name))]
-    dead = [(path, m) for path, m in found if alone or _is_dead(m)]
+    leftovers = [
+        (path, match) for path in _entries(Path(folder)) if (match := _FORM.match(path.name))
+    ]
+    dead = [(path, m) for path, m in leftovers if alone or _is_dead(m)]
     for path, match in dead:
         with contextlib.suppress(OSError, InputError):
             if match["state"] == "old":
