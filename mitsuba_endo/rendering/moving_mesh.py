@@ -35,9 +35,9 @@ class MovingMesh:
 def cast_into(scene: Any, origin: Any, direction: Any) -> tuple[Any, Any]:
     """Return (triangle index, hit) of rays into a scene of one mesh, as :meth:`MovingMesh.cast`."""
     ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
-    found = scene.ray_intersect_preliminary(ray, coherent=True)
-    hit = found.is_valid()
-    return dr.select(hit, found.prim_index, 0), hit
+    intersection = scene.ray_intersect_preliminary(ray, coherent=True)
+    hit = intersection.is_valid()
+    return dr.select(hit, intersection.prim_index, 0), hit
 
 
 def vector(values: NDArray[np.float64]) -> Any:

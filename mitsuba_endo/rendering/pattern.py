@@ -65,9 +65,9 @@ def parse_pattern(name: str, **parameters: Any) -> GridPattern | CodedGrid:
         InputError: unknown pattern, unknown parameter, or a value that is out of range.
     """
     if name not in PATTERNS:
-        known = ", ".join(sorted(PATTERNS))
+        names = ", ".join(sorted(PATTERNS))
         raise InputError(
-            f"there is no pattern called {name!r}", "pattern", f"choose one of {known}"
+            f"there is no pattern called {name!r}", "pattern", f"choose one of {names}"
         )
     try:
         return PATTERNS[name](**parameters)

@@ -34,6 +34,6 @@ def distances(
         NaN where a ray is parallel to its triangle.
     """
     a, b, c = (vector(corners[:, i]) for i in range(3))
-    start, way = vector(np.broadcast_to(origin, directions.shape)), vector(directions)
-    distance = plane_distance(start, way, (a, b, c)).numpy()
+    start, direction = vector(np.broadcast_to(origin, directions.shape)), vector(directions)
+    distance = plane_distance(start, direction, (a, b, c)).numpy()
     return np.where(np.isfinite(distance), distance, np.nan)

@@ -105,9 +105,9 @@ class LoadedScene:
         return mi.traverse(self.scene)
 
     def _find(self, objects: Any, identifier: str, kind: str, attribute: str) -> Any:
-        found = [o for o in objects if o.id() == identifier and hasattr(o, attribute)]
-        if found:
-            return found[0]
+        matches = [o for o in objects if o.id() == identifier and hasattr(o, attribute)]
+        if matches:
+            return matches[0]
         raise InputError(
             f"no {kind} with the id {identifier!r}", self.source, f'add one with id="{identifier}"'
         )

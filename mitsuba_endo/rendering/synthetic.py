@@ -45,8 +45,8 @@ class Hits:
 
     def from_behind(self, origin: NDArray[np.float64]) -> float:
         """Return the share of the hits that rays from ``origin`` (3,) have on faces' backs."""
-        ways, normals = self.points[self.hit] - origin, self.normals[self.hit]
-        away = np.einsum("ni,ni->n", normals, ways) > 0
+        directions, normals = self.points[self.hit] - origin, self.normals[self.hit]
+        away = np.einsum("ni,ni->n", normals, directions) > 0
         return float(away.mean()) if len(away) else 0.0
 
 
@@ -85,8 +85,8 @@ class MeshScene:
             projector_from_camera: its pose relative to the camera.
             size: pattern (width, height); coordinates outside are missing. None: no limit.
         """
-        seen = self.through_pixels(camera, world_from_camera)
-        points, hit = seen.points, seen.hit
+        hits = self.through_pixels(camera, world_from_camera)
+        points, hit = hits.points, hits.hit
         camera_from_world = world_from_camera.inverse()
         world_from_projector = world_from_camera @ projector_from_camera.inverse()
         at = camera_from_world.apply(points)
@@ -111,14 +111,14 @@ class MeshScene:
         distance = np.linalg.norm(points, axis=1)
         here, pose = Pose.of(RigidTransform.identity()), Pose.of(projector_from_camera)
         model = FrameModel(camera, here, pose, projector)
-        ways = vector(points / distance[:, None])
-        u, v, front = project_along(model, ways, mi.Float64(distance))
+        directions = vector(points / distance[:, None])
+        u, v, front = project_along(model, directions, mi.Float64(distance))
         return np.where(front.numpy()[:, None], np.stack([u.numpy(), v.numpy()], -1), np.nan)
 
     def through_pixels(self, camera: CameraModel, world_from_camera: RigidTransform) -> Hits:
         """Follow the rays through all pixels' centres, row by row."""
-        ways = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
-        return self.cast(world_from_camera.t, ways)
+        directions = world_from_camera.rotate(camera.grid_rays.reshape(-1, 3))
+        return self.cast(world_from_camera.t, directions)
 
     def cast(self, origin: NDArray[np.float64], directions: NDArray[np.float64]) -> Hits:
         """Follow rays from an origin (3,), or one for each (N, 3), along directions (N, 3)."""
@@ -140,8 +140,8 @@ class MeshScene:
         self, origin: NDArray[np.float64], points: NDArray[np.float64]
     ) -> NDArray[np.bool_]:
         """Tell which points (N, 3) of the mesh are seen from ``origin`` (3,)."""
-        way = np.nan_to_num(points - origin, nan=1.0)
-        distance = np.linalg.norm(way, axis=1)
-        met = self.cast(origin, way / distance[:, None])
+        offsets = np.nan_to_num(points - origin, nan=1.0)
+        distance = np.linalg.norm(offsets, axis=1)
+        met = self.cast(origin, offsets / distance[:, None])
         reached = np.linalg.norm(np.nan_to_num(met.points) - origin, axis=1)
         return ~met.hit | (reached > distance * (1 - _TOUCHES))
