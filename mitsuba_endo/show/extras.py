@@ -35,20 +35,20 @@ def extra(name: str) -> Callable[[Save], Save]:
     return register
 
 
-def check_extras(names: Sequence[str], where: str, known: Collection[str] = EXTRAS) -> None:
+def check_extras(names: Sequence[str], where: str, choices: Collection[str] = EXTRAS) -> None:
     """Refuse names of files that are not written.
 
     Args:
         names: that were asked for.
         where: option or argument.
-        known: those that there are.
+        choices: those that there are.
 
     Raises:
         InputError: names the first one and those that there are.
     """
     for name in names:
-        if name not in known:
-            raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(known)}")
+        if name not in choices:
+            raise InputError(f"'{name}' is unknown", where, f"choose from {', '.join(choices)}")
 
 
 def write_depth(path: Path, points: NDArray[np.float64]) -> None:

@@ -214,8 +214,8 @@ def overview_figure(calibration: Calibration, view: SurfaceView) -> Figure:
 
 def projector_poses(solution: Solution) -> list[RigidTransform]:
     """Return every known projector's pose in the first camera's frame."""
-    found = [at.first_from_projector for at in frame_poses(solution)]
-    return [pose for pose in found if pose is not None]
+    poses = [at.first_from_projector for at in frame_poses(solution)]
+    return [pose for pose in poses if pose is not None]
 
 
 def _of(frame: FrameMaps, frames: Sequence[FrameMaps], prefix: str = "") -> str:

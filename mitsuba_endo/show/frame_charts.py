@@ -53,11 +53,11 @@ def _poses(
 ) -> Figure:
     figure = Figure(figsize=(7, 4.6), layout=Margins())
     above, below = figure.subplots(2, sharex=True)
-    found = np.array([_six(of(frame)) for frame in frames])
+    estimates = np.array([_six(of(frame)) for frame in frames])
     number = np.arange(1, len(frames) + 1)
     for axes, part, label in ((above, 3, f"translation, {unit}"), (below, 0, "rotation, deg")):
         for k, (name, colour) in enumerate(_AXES):
-            value, std = found[:, part + k, 0], found[:, part + k, 1]
+            value, std = estimates[:, part + k, 0], estimates[:, part + k, 1]
             axes.plot(number, value, "o-", ms=2.5, lw=1, color=colour, label=name)
             low, high = value - INTERVAL * std, value + INTERVAL * std
             axes.fill_between(number, low, high, color=colour, alpha=0.25, lw=0)

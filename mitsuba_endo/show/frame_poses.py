@@ -39,9 +39,11 @@ def frame_poses(solution: Solution) -> list[FramePoses]:
         if i == 0:
             camera = first = first or RigidTransform.identity()
         pose = frame.projector_from_camera.to_transform()
-        seen = None if camera is None or first is None else first.inverse() @ camera
-        lit = None if seen is None or pose is None else seen @ pose.inverse()
-        out.append(FramePoses(frame.name, seen, lit))
+        first_from_camera = None if camera is None or first is None else first.inverse() @ camera
+        first_from_projector = None
+        if first_from_camera is not None and pose is not None:
+            first_from_projector = first_from_camera @ pose.inverse()
+        out.append(FramePoses(frame.name, first_from_camera, first_from_projector))
     return out
 
 

@@ -84,6 +84,8 @@ def _canvas(image: NDArray[np.integer] | NDArray[np.floating], factor: int) -> N
 
 
 def _label(canvas: NDArray[np.uint8], at: NDArray[np.integer], text: str) -> None:
-    place = (int(at[0]) + 4, int(at[1]) - 4)
+    corner = (int(at[0]) + 4, int(at[1]) - 4)
     for colour, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, thick, cv2.LINE_AA)
+        cv2.putText(
+            canvas, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, thick, cv2.LINE_AA
+        )

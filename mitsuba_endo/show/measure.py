@@ -56,8 +56,10 @@ class Distance:
         """Say the length with its 95 % interval and unit."""
         value, half = interval(self.value, self.std)
         unit = "mm" if solution.units == "mm" else "first baselines (up to scale)"
-        known = "95 %" if self.correlated else "at least 95 %"
-        said = f"{value} {half} {unit} ({known})" if half else f"{value} {unit}, no interval known"
+        coverage = "95 %" if self.correlated else "at least 95 %"
+        said = (
+            f"{value} {half} {unit} ({coverage})" if half else f"{value} {unit}, no interval known"
+        )
         return said
 
 
@@ -101,9 +103,9 @@ def distance(
     """
     between = a.position - b.position
     length = float(np.linalg.norm(between))
-    known = surface.modes is not None
+    correlated = surface.modes is not None
     if surface.std is None or length == 0:
-        return Distance(length, None, known)
+        return Distance(length, None, correlated)
     along = between / length
     shared, own = np.zeros(1), []
     for point, sign in ((a, 1.0), (b, -1.0)):
@@ -116,6 +118,6 @@ def distance(
             shared = shared + c @ modes
             variance = np.maximum(variance - np.sum(modes**2, -1), 0.0)
         own.append(float(np.abs(c) @ np.sqrt(variance)))
-    ends = own[0] ** 2 + own[1] ** 2 if known else (own[0] + own[1]) ** 2
+    ends = own[0] ** 2 + own[1] ** 2 if correlated else (own[0] + own[1]) ** 2
     unit = length * scale_std_percent / 100
-    return Distance(length, float(np.sqrt(shared @ shared + ends + unit**2)), known)
+    return Distance(length, float(np.sqrt(shared @ shared + ends + unit**2)), correlated)

@@ -133,8 +133,8 @@ def surface_std(axes: Axes, view: SurfaceView, unit: str) -> None:
 
 def surface_error(axes: Axes, error: NDArray[np.float64], unit: str) -> None:
     """Draw found minus true range (H, W) along the viewing rays, signed."""
-    known = np.abs(error[np.isfinite(error)])
-    top = float(np.percentile(known, 98)) if len(known) else 1.0
+    magnitudes = np.abs(error[np.isfinite(error)])
+    top = float(np.percentile(magnitudes, 98)) if len(magnitudes) else 1.0
     norm = Normalize(-top, top)
     scale = matplotlib.colormaps[RESIDUAL].with_extremes(bad=MISSING)
     axes.imshow(error, cmap=scale, norm=norm, interpolation="nearest")

@@ -99,15 +99,15 @@ def read_observed(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     Raises:
         InputError: missing or damaged file.
     """
-    seen = read_exr(path)
-    if USED not in seen:
+    channels = read_exr(path)
+    if USED not in channels:
         raise InputError(f"channel {USED} is missing", str(path), "calibrate again")
-    return _stacked(seen, path), seen[USED] > 0
+    return _stacked(channels, path), channels[USED] > 0
 
 
 def _frame(name: str, rendered: Path, observed: Path) -> FrameMaps:
-    seen, used = read_observed(observed)
-    return FrameMaps(name, seen, _stacked(read_exr(rendered), rendered), used)
+    q, used = read_observed(observed)
+    return FrameMaps(name, q, _stacked(read_exr(rendered), rendered), used)
 
 
 def _stacked(channels: dict[str, NDArray[np.float32]], path: Path) -> NDArray[np.float32]:

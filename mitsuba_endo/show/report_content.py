@@ -72,7 +72,9 @@ def given(solution: Solution) -> str:
 
 def number_groups(solution: Solution) -> list[tuple[str, list[Row]]]:
     """Return the values by the device or frame that they belong to."""
-    return [(name, list(found)) for name, found in groupby(rows(solution), lambda row: row.group)]
+    return [
+        (name, list(members)) for name, members in groupby(rows(solution), lambda row: row.group)
+    ]
 
 
 def candidates(solution: Solution) -> list[dict[str, Any]]:

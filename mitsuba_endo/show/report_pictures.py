@@ -65,14 +65,16 @@ def scene_of(scene: ResultScene, view: SurfaceView, number: int) -> Markup:
 
 def viewer(calibration: Calibration, number: int) -> Markup:
     """Return photographs, observed, rendered and residual maps, with sliders."""
-    pages, known = map_pages(calibration.frames), calibration.photographs
+    pages, photographs = map_pages(calibration.frames), calibration.photographs
+    names = [frame.name for frame in calibration.frames]
     shown = [
         FramePictures(
-            frame.name,
-            photograph_uri(known[frame.name], pages.shrink) if frame.name in known else "", images,
+            name,
+            photograph_uri(photographs[name], pages.shrink) if name in photographs else "",
+            images,
         )
-        for frame, images in zip(calibration.frames, pages.images, strict=True)
-    ]  # fmt: skip
+        for name, images in zip(names, pages.images, strict=True)
+    ]
     return render(
         "viewer.html", frames=shown, number=number, photographed=any(f.photograph for f in shown),
         scales=pages.coordinate_scales, residual_scale=pages.residual_scale,
@@ -106,10 +108,12 @@ def charts(scene: ResultScene, view: SurfaceView) -> list[Picture]:
     if trace:
         note = _CONVERGENCE if trace[-1].fixed_cost is not None else ""
         drawn.append(_chart("convergence", figures.convergence_figure(trace), note))
-    known = solution.observability.get("correlation")
-    if known:
-        figure = figures.correlation_figure(known["unknowns"], known["matrix"])
-        drawn.append(_chart("correlation", figure, wide=len(known["unknowns"]) > figures.NARROW))
+    correlation = solution.observability.get("correlation")
+    if correlation:
+        figure = figures.correlation_figure(correlation["unknowns"], correlation["matrix"])
+        drawn.append(
+            _chart("correlation", figure, wide=len(correlation["unknowns"]) > figures.NARROW)
+        )
     return drawn
 
 

@@ -75,9 +75,13 @@ class ResultScene:
     def rays(self, frame: int) -> Rays | None:
         """Return a sample of a frame's correspondences, None where its projector is unknown."""
         if frame not in self._rays:
-            known = self.calibration
+            calibration = self.calibration
             self._rays[frame] = correspondence_rays(
-                known.solution, known.camera, known.frames[frame], self.poses[frame], RAYS
+                calibration.solution,
+                calibration.camera,
+                calibration.frames[frame],
+                self.poses[frame],
+                RAYS,
             )
         return self._rays[frame]
 

@@ -26,9 +26,9 @@ KINDS: dict[str, tuple[str, Callable[[Path, Floats], None]]] = {
 class SequenceViews:
     """Points that frames see; each part's mesh enters Mitsuba once."""
 
-    def __init__(self, found: SequenceResult) -> None:
-        self._found = found
-        self._camera = found.rig.camera.to_model()
+    def __init__(self, result: SequenceResult) -> None:
+        self._result = result
+        self._camera = result.rig.camera.to_model()
         self._casters: dict[int, RayCaster] = {}
 
     def points(self, row: FrameRow) -> Floats:
@@ -47,14 +47,14 @@ class SequenceViews:
 
     def _caster(self, row: FrameRow) -> RayCaster:
         if row.part not in self._casters:
-            surface = self._found.surfaces[row.part]
+            surface = self._result.surfaces[row.part]
             if surface is None:
                 raise InputError(f"no surface was found around {row.name}", "frame", "another one")
             self._casters[row.part] = RayCaster(surface.vertices, surface.faces)
         return self._casters[row.part]
 
 
-def save_views(folder: Path, found: SequenceResult, kinds: Sequence[str]) -> None:
+def save_views(folder: Path, result: SequenceResult, kinds: Sequence[str]) -> None:
     """Write files of every placed frame of parts with a surface into folders of their kind's name.
 
     Raises:
@@ -63,11 +63,11 @@ def save_views(folder: Path, found: SequenceResult, kinds: Sequence[str]) -> Non
     check_extras(kinds, "kinds", KINDS)
     if not kinds:
         return
-    views = SequenceViews(found)
+    views = SequenceViews(result)
     for kind in kinds:
         (folder / kind).mkdir()
-    for row in found.rows:
-        if row.lost or found.surfaces[row.part] is None:
+    for row in result.rows:
+        if row.lost or result.surfaces[row.part] is None:
             continue
         points = views.points(row)
         for kind in kinds:

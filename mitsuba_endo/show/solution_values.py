@@ -111,8 +111,8 @@ def interval(value: float | None, std: float | None) -> tuple[str, str]:
     if std is None or not std > 0:
         return f"{value:.6g}", ""
     half = INTERVAL * std
-    places = max(0, 1 - math.floor(math.log10(half)))
-    return f"{value:.{places}f}", f"± {half:.{places}f}"
+    decimals = max(0, 1 - math.floor(math.log10(half)))
+    return f"{value:.{decimals}f}", f"± {half:.{decimals}f}"
 
 
 def headline(solution: Solution) -> str:

@@ -45,9 +45,9 @@ class Shown:
     def rgb(self, surface: int) -> NDArray[np.uint8]:
         """Return the colours (V, 3) of a surface's vertices."""
         share = self.share(surface)
-        known = np.isfinite(share)
-        colours = matplotlib.colormaps[self.scale](np.where(known, share, 0.0))[:, :3]
-        colours[~known] = to_rgb(MISSING)
+        finite = np.isfinite(share)
+        colours = matplotlib.colormaps[self.scale](np.where(finite, share, 0.0))[:, :3]
+        colours[~finite] = to_rgb(MISSING)
         return np.round(255 * colours).astype(np.uint8)
 
     def legend(self) -> str:
@@ -80,15 +80,15 @@ def error(errors: list[Floats], unit: str, alignment: str) -> Shown:
 def depth(vertices: list[Floats], unit: str) -> Shown:
     """Show how far along its camera's axis every vertex (V, 3) lies."""
     values = [v[:, 2] for v in vertices]
-    known = _known(values)
-    low, high = np.percentile(known, [1, 99]) if len(known) else (0.0, 1.0)
+    finite = _known(values)
+    low, high = np.percentile(finite, [1, 99]) if len(finite) else (0.0, 1.0)
     label = f"depth in the camera, {unit}"
     return Shown("depth", label, values, float(low), float(max(high, low + 1e-9)), DEPTH)
 
 
 def _top(values: list[Floats]) -> float:
-    known = _known(values)
-    return max(float(np.percentile(known, _SHARE)), 1e-12) if len(known) else 1.0
+    finite = _known(values)
+    return max(float(np.percentile(finite, _SHARE)), 1e-12) if len(finite) else 1.0
 
 
 def _known(values: list[Floats]) -> Floats:

@@ -10,12 +10,12 @@ from markupsafe import Markup
 
 @cache
 def _environment() -> Environment:
-    found = Environment(
+    environment = Environment(
         loader=PackageLoader("mitsuba_endo.show", "templates"), autoescape=True,
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    found.filters["minus"] = minus
-    return found
+    environment.filters["minus"] = minus
+    return environment
 
 
 def render(template: str, **content: Any) -> Markup:

@@ -53,10 +53,10 @@ def track_figure(tracked: TrackedFrames) -> Figure:
 
 def _components(axes: Axes, rows: Sequence[FrameRow], values: Callable[[FrameRow], Values]) -> None:
     numbers = np.array([row.number for row in rows], float)
-    found = [values(row) for row in rows]
+    estimates = [values(row) for row in rows]
     missing = np.full(3, np.nan)
-    mean = np.array([value for value, _ in found])
-    half = INTERVAL * np.array([missing if std is None else std for _, std in found])
+    mean = np.array([value for value, _ in estimates])
+    half = INTERVAL * np.array([missing if std is None else std for _, std in estimates])
     for k, (name, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         x, y, band = _with_gaps(numbers, mean[:, k], half[:, k])
         axes.plot(x, y, color=colour, label=name, linewidth=1)

@@ -33,9 +33,9 @@ def save_trajectories(folder: Path, rows: Sequence[FrameRow], suffix: str = "") 
 def frame_rows(solution: Solution) -> list[FrameRow]:
     """Return a row for every frame, and for those left out, with the reason."""
     pixels = None if solution.camera is None else solution.camera.width * solution.camera.height
-    known = [_row(k, frame, pixels) for k, frame in enumerate(solution.frames)]
-    return known + [
-        FrameRow(len(known) + k, out.name, lost=out.reason)
+    rows = [_row(k, frame, pixels) for k, frame in enumerate(solution.frames)]
+    return rows + [
+        FrameRow(len(rows) + k, out.name, lost=out.reason)
         for k, out in enumerate(solution.left_out)
     ]
 

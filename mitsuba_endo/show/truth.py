@@ -100,12 +100,12 @@ def _factor(
     if alignment == "none":
         return 1.0
     if surface is None:
-        found = "there is no true surface"
+        similarity = "there is no true surface"
     else:
-        found = alignment_of(calibration.surface, surface, calibration.camera, alignment)
-    if isinstance(found, str):
-        raise InputError(f"the solution is up to scale, and {found}", "truth", "leave it out")
-    return 1 / found.scale
+        similarity = alignment_of(calibration.surface, surface, calibration.camera, alignment)
+    if isinstance(similarity, str):
+        raise InputError(f"the solution is up to scale, and {similarity}", "truth", "leave it out")
+    return 1 / similarity.scale
 
 
 def _scaled(at: FramePoses, factor: float) -> FramePoses:

@@ -16,34 +16,34 @@ HIDDEN = 0.02
 voxel is a hundredth of it."""
 
 
-def vertex_colours(found: SequenceResult, part: int) -> NDArray[np.uint8] | None:
+def vertex_colours(result: SequenceResult, part: int) -> NDArray[np.uint8] | None:
     """Return the colours (V, 3), RGB, of the vertices of a part; None without photographs.
 
     Each is the mean over the photographs that show the vertex, near ones with more weight. The
     pattern and the fall of the light are in them.
     """
-    surface = found.surfaces[part]
-    rows = [found.rows[k] for k in sorted(found.pictures) if found.rows[k].part == part]
+    surface = result.surfaces[part]
+    rows = [result.rows[k] for k in sorted(result.pictures) if result.rows[k].part == part]
     if surface is None or not rows:
         return None
     caster = RayCaster(surface.vertices, surface.faces)
     sums, weights = np.zeros((len(surface.vertices), 3)), np.zeros(len(surface.vertices))
     for row in rows:
-        which, pixels, distance = _shown(surface.vertices, row, found, caster)
+        which, pixels, distance = _shown(surface.vertices, row, result, caster)
         weight = distance**-2.0
-        seen = found.pictures[row.number][pixels[:, 1], pixels[:, 0]]
-        sums[which] += weight[:, None] * seen
+        colours = result.pictures[row.number][pixels[:, 1], pixels[:, 0]]
+        sums[which] += weight[:, None] * colours
         weights[which] += weight
-    known = weights > 0
-    mean = sums / np.where(known, weights, 1.0)[:, None]
-    return np.where(known[:, None], np.round(mean), UNSEEN).astype(np.uint8)
+    coloured = weights > 0
+    mean = sums / np.where(coloured, weights, 1.0)[:, None]
+    return np.where(coloured[:, None], np.round(mean), UNSEEN).astype(np.uint8)
 
 
 def _shown(
-    vertices: Floats, row: FrameRow, found: SequenceResult, caster: RayCaster
+    vertices: Floats, row: FrameRow, result: SequenceResult, caster: RayCaster
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """Return which vertices (N,) a frame shows, at which pixels (N, 2), how far away (N,)."""
-    pose, camera = row.world_from_camera, found.rig.camera.to_model()
+    pose, camera = row.world_from_camera, result.rig.camera.to_model()
     assert pose is not None
     at = pose.inverse().apply(vertices)
     with np.errstate(all="ignore"):

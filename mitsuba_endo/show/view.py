@@ -37,25 +37,25 @@ def view_surface(surface: SurfaceEstimate, camera: CameraModel) -> SurfaceView:
     rays = camera.grid_rays
     flat = rays.reshape(-1, 3)
     distance, triangle = RayCaster(surface.vertices, surface.faces).meet(np.zeros(3), flat)
-    seen = np.isfinite(distance)
+    hit = np.isfinite(distance)
     points = np.full(flat.shape, np.nan)
-    points[seen] = flat[seen] * distance[seen, None]
-    corners = surface.faces[triangle[seen]]
-    weights = _barycentric(points[seen], surface.vertices[corners])
+    points[hit] = flat[hit] * distance[hit, None]
+    corners = surface.faces[triangle[hit]]
+    weights = _barycentric(points[hit], surface.vertices[corners])
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     normals = np.full(flat.shape, np.nan)
-    normals[seen] = _towards_camera(
-        np.einsum("nk,nkc->nc", weights, np.asarray(mesh.vertex_normals)[corners]), flat[seen]
+    normals[hit] = _towards_camera(
+        np.einsum("nk,nkc->nc", weights, np.asarray(mesh.vertex_normals)[corners]), flat[hit]
     )
     std = None
     if surface.std is not None:
         std = np.full(len(flat), np.nan)
-        std[seen] = np.sum(weights * surface.std[corners], -1)
+        std[hit] = np.sum(weights * surface.std[corners], -1)
         std = std.reshape(rays.shape[:2])
     modes = None
     if surface.modes is not None:
         modes = np.full((len(flat), surface.modes.shape[1]), np.nan)
-        modes[seen] = np.einsum("nk,nkm->nm", weights, surface.modes[corners])
+        modes[hit] = np.einsum("nk,nkm->nm", weights, surface.modes[corners])
         modes = modes.reshape(*rays.shape[:2], -1)
     return SurfaceView(points.reshape(rays.shape), normals.reshape(rays.shape), std, modes)
 

@@ -76,8 +76,10 @@ def scene_canvas(scene: ResultScene, views: list[SurfaceView], number: int = 0) 
 def _photographed(scene: ResultScene) -> str:
     """Return the name of the frame whose photograph lies on the surface that all share."""
     first = scene.poses[0].name
-    known = scene.calibration.photographs
-    return first if len(scene.surfaces) == 1 and len(scene.poses) > 1 and first in known else ""
+    photographs = scene.calibration.photographs
+    return (
+        first if len(scene.surfaces) == 1 and len(scene.poses) > 1 and first in photographs else ""
+    )
 
 
 def _step(view: SurfaceView, room: int) -> int:
@@ -142,9 +144,9 @@ def _paints(
 
 def _quads(points: Floats) -> NDArray[np.int64]:
     """Return quadrilaterals (Q, 4) of points (H, W, 3), NaN = not seen; those seen are counted."""
-    seen = np.isfinite(points[..., 2])
-    number = np.cumsum(seen).reshape(seen.shape) - 1
-    rows, columns = seen.shape
+    visible = np.isfinite(points[..., 2])
+    number = np.cumsum(visible).reshape(visible.shape) - 1
+    rows, columns = visible.shape
     corners = [
         np.s_[i : rows - 1 + i, j : columns - 1 + j] for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))
     ]

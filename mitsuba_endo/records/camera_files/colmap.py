@@ -53,12 +53,9 @@ def read(document: Document) -> CameraFile:
             f"calibrate with one of {', '.join(_MODELS)}",
         )  # fmt: skip
     model, focals, coefficients = _MODELS[kind]
-    if len(texts) != focals + 2 + len(coefficients):
-        raise InputError(
-            f"{kind} has {focals + 2 + len(coefficients)} parameters, not {len(texts)}",
-            where,
-            "mend it",
-        )
+    count = focals + 2 + len(coefficients)
+    if len(texts) != count:
+        raise InputError(f"{kind} has {count} parameters, not {len(texts)}", where, "mend it")
     values = numbers(texts, where)
     fx, fy = values[0], values[focals - 1]
     cx, cy = (c - _PIXEL_CENTRE for c in values[focals : focals + 2])

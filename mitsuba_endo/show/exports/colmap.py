@@ -56,12 +56,12 @@ def write_colmap(solution: Solution, folder: Path, path: Path) -> None:
     pinhole_only(solution, "COLMAP")
     if solution.surface is None:
         raise InputError("surface is missing", "solution.json", "calibrate again")
-    points, seen = _points(solution, folder)
-    cameras, images = _cameras(solution), _images(solution, seen)
+    points, frame_sightings = _points(solution, folder)
+    cameras, images = _cameras(solution), _images(solution, frame_sightings)
     with atomic_folder(path, Kind.COLMAP) as aside:
         _write(aside / "cameras.txt", cameras)
         _write(aside / "images.txt", images)
-        _write(aside / "points3D.txt", _point_lines(points, seen))
+        _write(aside / "points3D.txt", _point_lines(points, frame_sightings))
 
 
 def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list[Sightings]]:
@@ -75,23 +75,23 @@ def _points(solution: Solution, folder: Path) -> tuple[NDArray[np.float64], list
     ]
     starts = np.cumsum([0, *(len(s) for s in surfaces)])
     maps = observed_names([frame.name for frame in frames])
-    seen = []
+    frame_sightings = []
     for k, (frame, name) in enumerate(zip(frames, maps, strict=True)):
         surface = k if len(surfaces) > 1 else 0
-        found = sightings(
+        sighted = sightings(
             surfaces[surface], frame, camera, required_projector(solution, frame),
             poses[k].inverse(), projector_pose(frame), folder / name,
         )  # fmt: skip
-        seen.append(replace(found, points=found.points + starts[surface]))
-    return np.concatenate(surfaces), seen
+        frame_sightings.append(replace(sighted, points=sighted.points + starts[surface]))
+    return np.concatenate(surfaces), frame_sightings
 
 
-def _point_lines(points: NDArray[np.float64], seen: list[Sightings]) -> list[str]:
+def _point_lines(points: NDArray[np.float64], frame_sightings: list[Sightings]) -> list[str]:
     """Return a line a point: number, place, grey, mean error, and images with their points."""
     tracks: list[list[str]] = [[] for _ in points]
     errors: list[list[float]] = [[] for _ in points]
-    for k, found in enumerate(seen):
-        for i, (point, error) in enumerate(zip(found.points, found.error, strict=True)):
+    for k, sighted in enumerate(frame_sightings):
+        for i, (point, error) in enumerate(zip(sighted.points, sighted.error, strict=True)):
             tracks[point] += [f"{2 * k + 1} {i}", f"{2 * k + 2} {i}"]
             errors[point] += [0.0, float(error)]
     means = [float(np.mean(e)) if e else -1.0 for e in errors]
@@ -129,22 +129,22 @@ def _projector_values(projector: ProjectorModel) -> list[float]:
     ]  # fmt: skip
 
 
-def _images(solution: Solution, seen: list[Sightings]) -> list[str]:
+def _images(solution: Solution, frame_sightings: list[Sightings]) -> list[str]:
     """Return two lines an image, the second of which holds its 2D points."""
     lines = []
-    for i, (frame, found) in enumerate(zip(solution.frames, seen, strict=True)):
+    for i, (frame, sighted) in enumerate(zip(solution.frames, frame_sightings, strict=True)):
         camera_from_world = camera_pose(frame).inverse()
         projector_from_world = projector_pose(frame) @ camera_from_world
         name = frame.name.replace(" ", "_")
         camera = _image_line(2 * i + 1, camera_from_world, 1, name)
         projector = _image_line(2 * i + 2, projector_from_world, i + 2, f"projector/{name}")
-        lines += [camera, _points_line(found.pixels, found.points)]
-        lines += [projector, _points_line(found.q, found.points)]
+        lines += [camera, _points_line(sighted.pixels, sighted.points)]
+        lines += [projector, _points_line(sighted.q, sighted.points)]
     return lines
 
 
-def _points_line(places: NDArray[np.float64], points: NDArray[np.int64]) -> str:
-    shifted = (places + _PIXEL_CENTRE).tolist()
+def _points_line(positions: NDArray[np.float64], points: NDArray[np.int64]) -> str:
+    shifted = (positions + _PIXEL_CENTRE).tolist()
     return " ".join(f"{x!r} {y!r} {p + 1}" for (x, y), p in zip(shifted, points, strict=True))
 
 

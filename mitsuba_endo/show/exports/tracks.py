@@ -52,13 +52,17 @@ def sightings(
         nowhere = np.zeros((0, 2))
         return Sightings(np.zeros(0, np.int64), nowhere, nowhere, np.zeros(0))
     q, used = read_observed(observed)
-    seen = camera_from_world.apply(points)
-    front = seen[:, 2] > 0
-    pixels = np.where(front[:, None], camera.project(np.where(front[:, None], seen, [0, 0, 1])), -9)
-    found = _interpolated(np.where(used[..., None], q, np.nan), pixels)
-    error = np.linalg.norm(found - projector.project(projector_from_camera.apply(seen)), axis=-1)
+    in_camera = camera_from_world.apply(points)
+    front = in_camera[:, 2] > 0
+    pixels = np.where(
+        front[:, None], camera.project(np.where(front[:, None], in_camera, [0, 0, 1])), -9
+    )
+    interpolated = _interpolated(np.where(used[..., None], q, np.nan), pixels)
+    error = np.linalg.norm(
+        interpolated - projector.project(projector_from_camera.apply(in_camera)), axis=-1
+    )
     kept = np.flatnonzero(front & (error < _AGREE * (frame.rms_px or 1.0)))
-    return Sightings(kept, pixels[kept], found[kept], error[kept])
+    return Sightings(kept, pixels[kept], interpolated[kept], error[kept])
 
 
 def _interpolated(image: NDArray[np.float32], pixels: Floats) -> Floats:

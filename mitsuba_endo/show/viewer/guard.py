@@ -64,10 +64,12 @@ class Guard:
 def is_loopback(host: str) -> bool:
     """Tell whether an address to listen at is reached from this machine alone."""
     try:
-        found = socket.getaddrinfo(host or None, None, flags=socket.AI_PASSIVE)
+        addresses = socket.getaddrinfo(host or None, None, flags=socket.AI_PASSIVE)
     except OSError:
         return False
-    return bool(found) and all(_is_loopback_address(str(address[0])) for *_, address in found)
+    return bool(addresses) and all(
+        _is_loopback_address(str(address[0])) for *_, address in addresses
+    )
 
 
 @contextlib.contextmanager
@@ -102,11 +104,11 @@ def without_sharing(server: Any) -> None:
 
 def _said(request: Any) -> list[str]:
     """Return the tokens that a request brings, in its address and as a cookie."""
-    found = parse_qs(urlsplit(request.path).query).get(QUERY, [])
+    tokens = parse_qs(urlsplit(request.path).query).get(QUERY, [])
     with contextlib.suppress(CookieError):
         for line in request.headers.get_all("Cookie"):
-            found += [m.value for name, m in SimpleCookie(line).items() if name == COOKIE]
-    return [said for said in found if said.isascii()]
+            tokens += [m.value for name, m in SimpleCookie(line).items() if name == COOKIE]
+    return [said for said in tokens if said.isascii()]
 
 
 def _is_loopback_address(name: str) -> bool:

@@ -24,17 +24,17 @@ class Picker:
 
     def add(self, origin: Any, direction: Any, surfaces: list[int]) -> None:
         """Pick the point of the surfaces shown that a ray of the first camera's frame meets."""
-        found = self._nearest(np.asarray(origin, float), np.asarray(direction, float), surfaces)
-        if found is None:
+        picked = self._nearest(np.asarray(origin, float), np.asarray(direction, float), surfaces)
+        if picked is None:
             self.words = "There is no surface; click on it."
             return
         if len(self.points) == 2:
             self.clear()
-        if self.points and self.points[0][0] != found[0]:
+        if self.points and self.points[0][0] != picked[0]:
             self.words = "The two points must lie on the surface of one frame."
             return
-        self.points.append(found)
-        self._mark(found)
+        self.points.append(picked)
+        self._mark(picked)
         self.words = "One point; click the other." if len(self.points) == 1 else self._measure()
 
     def clear(self) -> None:
@@ -75,7 +75,7 @@ class Picker:
     def _measure(self) -> str:
         (surface, a), (_, b) = self.points
         solution = self.scene.calibration.solution
-        found = distance(self.scene.surfaces[surface], a, b, solution.scale_std_percent)
+        measurement = distance(self.scene.surfaces[surface], a, b, solution.scale_std_percent)
         ends = np.stack([self._place(p) for p in self.points])
         scene = self.server.scene
         self._marks.append(
@@ -83,7 +83,7 @@ class Picker:
                 "/measure/line", ends[None], MARK, thickness=3.0, thickness_units="screen"
             )
         )
-        words = found.words(solution)
+        words = measurement.words(solution)
         self._marks.append(
             scene.add_label(
                 "/measure/label", words, position=self._above(ends), anchor="bottom-center",
