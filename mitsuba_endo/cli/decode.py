@@ -99,12 +99,12 @@ def decode(
         prepare_folder(out, Kind.MAPS, [*images, *(path for path in (rig, weights, mask) if path)])
         record = load_rig(rig)
         with atomic_folder(out, Kind.MAPS) as folder:
-            found = decode_into(folder, images, record, pattern, weights, refine, output, mask)
-            refuse_nothing(found)
-        decoded = [one for one in found if not one.reason]
-        output.print(*(one.line() for one in found))
-        output.summary({"folder": str(out), "frames": [_fields(one) for one in found]})
-        raise typer.Exit(0 if len(decoded) == len(found) else EXIT_FAULT)
+            summaries = decode_into(folder, images, record, pattern, weights, refine, output, mask)
+            refuse_nothing(summaries)
+        decoded = [one for one in summaries if not one.reason]
+        output.print(*(one.line() for one in summaries))
+        output.summary({"folder": str(out), "frames": [_fields(one) for one in summaries]})
+        raise typer.Exit(0 if len(decoded) == len(summaries) else EXIT_FAULT)
 
 
 def decode_into(
@@ -131,7 +131,7 @@ def decode_into(
 
     decoder = ImageDecoder(rig, pattern, weights, refine=refine)
     masks = Masks.at(mask) if mask else None
-    found, notes = [], set()
+    summaries, notes = [], set()
     with output.progress("Decoding") as advance:
         for k, frame in enumerate(read_frames(images), 1):
             of = f"frame {k}" if len(images) == 1 else f"frame {k} of {max(k, len(images))}"
@@ -143,9 +143,9 @@ def decode_into(
             map_ = decoded.map
             if masks:
                 map_ = replace(map_, map=masks.applied(map_.map))
-            found.append(_summary(frame.name, decoded.grid, map_))
+            summaries.append(_summary(frame.name, decoded.grid, map_))
             _write(folder, frame, decoded.grid, map_)
-    return found
+    return summaries
 
 
 def _summary(name: str, result: "DecodedGrid", map_: "DecodedMap") -> Summary:
@@ -194,10 +194,10 @@ def decode_images(
     if map_convention:
         raise InputError("is for maps, and images are given", "--map-convention", "leave it out")
     rig = load_rig(rig_file)
-    found = decode_into(aside, images, rig, pattern, None, refine, output)
-    refuse_nothing(found)
-    output.print(*(one.line() for one in found))
-    return [map_path(aside, one.name) for one in found if not one.reason]
+    summaries = decode_into(aside, images, rig, pattern, None, refine, output)
+    refuse_nothing(summaries)
+    output.print(*(one.line() for one in summaries))
+    return [map_path(aside, one.name) for one in summaries if not one.reason]
 
 
 def _is_stack(pattern: str) -> bool:
@@ -207,7 +207,7 @@ def _is_stack(pattern: str) -> bool:
     return pattern in KINDS
 
 
-def refuse_nothing(found: Sequence[Summary]) -> None:
+def refuse_nothing(summaries: Sequence[Summary]) -> None:
     """Refuse images none of which shows the pattern.
 
     Raises:
@@ -215,9 +215,9 @@ def refuse_nothing(found: Sequence[Summary]) -> None:
     """
     from ..errors import NothingDecodedError
 
-    if found and all(one.reason for one in found):
-        first = found[0]
-        where = first.name if len(found) == 1 else f"{first.name} and {len(found) - 1} more"
+    if summaries and all(one.reason for one in summaries):
+        first = summaries[0]
+        where = first.name if len(summaries) == 1 else f"{first.name} and {len(summaries) - 1} more"
         todo = "check the pattern, light and focus; photographs of a stack take --pattern stack"
         raise NothingDecodedError(first.reason, where, todo)
 

@@ -80,14 +80,14 @@ def _extras() -> list[Check]:
 
 
 def _extra(name: str, use: str, packages: Sequence[str], version: Callable[[str], str]) -> Check:
-    found = []
+    installed = []
     for package in packages:
         try:
-            found.append(f"{package} {version(package)}")
+            installed.append(f"{package} {version(package)}")
         except importlib.metadata.PackageNotFoundError:
             todo = f'pip install "mitsuba-endo[{name}]"'
             return Check(f"extra {name}", "absent", f"{use}: {package} is not installed", todo)
-    return Check(f"extra {name}", "ok", ", ".join(found))
+    return Check(f"extra {name}", "ok", ", ".join(installed))
 
 
 def _leftovers() -> Check:
@@ -119,14 +119,14 @@ def run_probe(name: str) -> tuple[bool, str]:
 
 
 def _versions() -> Check:
-    found = [f"mitsuba-endo {__version__}", f"Python {platform.python_version()}"]
+    versions = [f"mitsuba-endo {__version__}", f"Python {platform.python_version()}"]
     for package in ("mitsuba", "drjit", "numpy"):
         try:
-            found.append(f"{package} {importlib.metadata.version(package)}")
+            versions.append(f"{package} {importlib.metadata.version(package)}")
         except importlib.metadata.PackageNotFoundError:
             todo = "pip install mitsuba-endo"
             return Check("versions", "fault", f"{package} is not installed", todo)
-    return Check("versions", "ok", ", ".join(found))
+    return Check("versions", "ok", ", ".join(versions))
 
 
 def _judge(name: str, succeeded: bool, said: str) -> Check:

@@ -26,11 +26,11 @@ def llvm() -> str:
     import drjit as dr
     from drjit.llvm import Float
 
-    found = os.environ.get("DRJIT_LIBLLVM_PATH", "found by Dr.Jit on the system")
+    library = os.environ.get("DRJIT_LIBLLVM_PATH", "found by Dr.Jit on the system")
     version = dr.detail.llvm_version()
     if version[0] < 0:
-        raise RuntimeError(f"no LLVM library ({found})")
-    text = f"LLVM {'.'.join(map(str, version))}, {found}"
+        raise RuntimeError(f"no LLVM library ({library})")
+    text = f"LLVM {'.'.join(map(str, version))}, {library}"
     if tuple(version) < backend.MINIMUM_LLVM:
         raise RuntimeError(f"{text} is older than {backend.MINIMUM_LLVM[0]}")
     x = dr.clip(dr.arange(Float, 4), 1.0, 2.0)

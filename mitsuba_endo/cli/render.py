@@ -75,9 +75,11 @@ def render(
         from ..show.capture_folder import write_capture_folder
 
         settings = parse_settings(parameters)
-        way = SequenceRequest(trajectory, projector_trajectory, frames, noise, nothing, photographs)
-        if way.check():
-            render_sequence(scene, out, settings, way, spp, seed, output)
+        request = SequenceRequest(
+            trajectory, projector_trajectory, frames, noise, nothing, photographs
+        )
+        if request.check():
+            render_sequence(scene, out, settings, request, spp, seed, output)
             return
         # A scene or a value that is no path names no file, and is passed over.
         prepare_folder(out, Kind.CAPTURE, [scene, *settings.values()])

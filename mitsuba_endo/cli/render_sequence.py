@@ -63,7 +63,7 @@ def render_sequence(
     scene: str,
     out: Path,
     settings: dict[str, str],
-    way: SequenceRequest,
+    request: SequenceRequest,
     spp: int,
     seed: int,
     output: Session,
@@ -73,13 +73,13 @@ def render_sequence(
     from ..outputs import prepare_folder
     from ..show.recording_folder import write_recording_folder
 
-    files = [path for path in (way.trajectory, way.projector_trajectory) if path]
+    files = [path for path in (request.trajectory, request.projector_trajectory) if path]
     prepare_folder(out, Kind.RECORDING, [scene, *settings.values(), *files])
     with output.progress("Starting Mitsuba") as advance:
-        capture = moving_capture(scene, settings, way, seed)
-        write_recording_folder(out, capture, spp if way.photographs else None, advance)
-    what = "photographs" if way.photographs else "maps"
-    folder = "images" if way.photographs else "maps"
+        capture = moving_capture(scene, settings, request, seed)
+        write_recording_folder(out, capture, spp if request.photographs else None, advance)
+    what = "photographs" if request.photographs else "maps"
+    folder = "images" if request.photographs else "maps"
     output.print(
         f"{out}: {len(capture)} {what}. Track them: mitsuba-endo sequence {out}/{folder} "
         f"--rig {out}/rig.yaml --out result"
@@ -88,7 +88,7 @@ def render_sequence(
 
 
 def moving_capture(
-    scene: str, settings: dict[str, str], way: SequenceRequest, seed: int
+    scene: str, settings: dict[str, str], request: SequenceRequest, seed: int
 ) -> "MovingCapture":
     """Load a scene and read or make the way through it.
 
@@ -101,22 +101,22 @@ def moving_capture(
     from ..rendering.moving_capture import MovingCapture
     from ..rendering.scene import load_scene
 
-    dark = way.dark()
-    assert way.trajectory is not None
+    dark = request.dark()
+    assert request.trajectory is not None
     rng = np.random.default_rng([seed, 1])
-    if way.trajectory in TRAJECTORIES:
-        cameras = TRAJECTORIES[way.trajectory](way.frames, rng)
+    if request.trajectory in TRAJECTORIES:
+        cameras = TRAJECTORIES[request.trajectory](request.frames, rng)
     else:
-        cameras = _read(Path(way.trajectory), way.frames)
+        cameras = _read(Path(request.trajectory), request.frames)
     projectors = creeping(len(cameras), rng)
-    if way.projector_trajectory is not None:
-        lights = _read(way.projector_trajectory, len(cameras))
+    if request.projector_trajectory is not None:
+        lights = _read(request.projector_trajectory, len(cameras))
         poses = [light.inverse() @ camera for light, camera in zip(lights, cameras, strict=True)]
         projectors = [pose @ poses[0].inverse() for pose in poses]
     first = cameras[0].inverse()
     moved = [first @ camera for camera in cameras]
     loaded = load_scene(scene, **settings)
-    return MovingCapture(loaded, moved, projectors, way.noise, dark, seed)
+    return MovingCapture(loaded, moved, projectors, request.noise, dark, seed)
 
 
 def _read(path: Path, count: int) -> list["RigidTransform"]:

@@ -58,13 +58,13 @@ class Photographs:
         grid = coded_grid(self.pattern or PATTERN, *size)
         masks = Masks.at(self.mask) if self.mask else None
         more: dict[str, Any] = {"masked": masks.applied} if masks else {}
-        found, calibration = second_round(
+        second, calibration = second_round(
             first, maps, self._pictures(), grid_image(grid), rig, options,
             progress=advance, observe=observe, **more,
         )  # fmt: skip
-        self.output.print(found.line())
+        self.output.print(second.line())
         if calibration is not first:
-            for map_ in found.maps:
+            for map_ in second.maps:
                 self._write(map_, grid.period)
         return calibration
 

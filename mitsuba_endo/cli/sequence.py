@@ -104,8 +104,8 @@ def sequence(
         keeper = UnfinishedFolder(out, feed.marks, reading)
         options = SequenceOptions(voxel=voxel)
         with watching_sequence(live, record, output) as watch:
-            seen = [watch.view] if watch else []
-            result = _track(feed, record, options, past, keeper, seen, out, kinds, output)
+            watchers = [watch.view] if watch else []
+            result = _track(feed, record, options, past, keeper, watchers, out, kinds, output)
             _report(result, out, output)
             if watch:
                 watch.end(result.solution, output)
@@ -145,8 +145,8 @@ def _track(
     output: Session,
 ) -> "SequenceResult":
     """Go through the frames with a line for each, write the folder and return what was found."""
-    with _progress(output, feed.count) as (say, on_frame):
-        say("Starting Mitsuba")
+    with _progress(output, feed.count) as (announce, on_frame):
+        announce("Starting Mitsuba")
         from .. import backend
 
         backend.use()
@@ -155,13 +155,15 @@ def _track(
         from ..sequence.run import run_sequence
         from ..show.sequence_folder import write_sequence_folder
 
-        say("Calibrating the first frames" if past is None else "Passing over frames seen before")
+        announce(
+            "Calibrating the first frames" if past is None else "Passing over frames seen before"
+        )
         run = past and past.go_on(rig, options, on_frame)
         keepers = Keepers([keeper, *watching])
         recorded = run_sequence(feed, rig, options, on_frame, run=run, keeper=keepers)
-        say("Adjusting all frames together")
+        announce("Adjusting all frames together")
         result = outcome_of(recorded, options.vertices)
-        say("Writing the folder")
+        announce("Writing the folder")
         write_sequence_folder(out, result, keeper.copy_state, kinds)
         keeper.remove()
     return result
@@ -196,8 +198,8 @@ def frame_line(row: "FrameRow", count: int | None) -> str:
     head = f"frame {row.number + 1}{of} ({row.name})"
     if row.lost:
         return f"{head}: lost, {row.lost}"
-    known = "begins a map" if row.overlap is None else f"{100 * row.overlap:.0f} % known before"
-    return f"{head}: {known}"
+    overlap = "begins a map" if row.overlap is None else f"{100 * row.overlap:.0f} % known before"
+    return f"{head}: {overlap}"
 
 
 def _report(result: "SequenceResult", out: Path, output: Session) -> None:

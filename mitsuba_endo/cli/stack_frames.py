@@ -41,12 +41,14 @@ def _decode(stack: Path, out: Path, size: tuple[int, int], pattern: str, output:
     from ..records.correspondence import write_map
 
     with output.progress(f"Decoding {stack}") as advance:
-        found = stack_map(stack, size, pattern, lambda share: advance(share, f"Decoding {stack}"))
-    write_map(out, found.map)
+        decoding = stack_map(
+            stack, size, pattern, lambda share: advance(share, f"Decoding {stack}")
+        )
+    write_map(out, decoding.map)
     output.print(
-        *([f"warning: {found.note}"] if found.note else []),
-        f"{stack}: read as --pattern {found.reading.plan.kind} "
-        f"--convention {','.join(found.reading.words)}; "
-        f"{100 * found.decoded:.1f} % of the lit pixels decoded.",
+        *([f"warning: {decoding.note}"] if decoding.note else []),
+        f"{stack}: read as --pattern {decoding.reading.plan.kind} "
+        f"--convention {','.join(decoding.reading.words)}; "
+        f"{100 * decoding.decoded:.1f} % of the lit pixels decoded.",
     )
     return out

@@ -140,16 +140,16 @@ def comparison_table(solution: "Solution", truth: "Solution") -> "Table":
         "pattern px",
     )  # fmt: skip
     estimate = solution.frames[0].projector_from_camera
-    found, true = (s.frames[0].projector_from_camera.to_transform() for s in (solution, truth))
-    if found is None or true is None:
+    pose, true = (s.frames[0].projector_from_camera.to_transform() for s in (solution, truth))
+    if pose is None or true is None:
         return table
     std = estimate.std or [None] * 6
     degrees = [None if s is None else float(np.degrees(s)) for s in std[:3]]
-    angles = zip("xyz", _rotation_degrees(found.R), degrees, _rotation_degrees(true.R), strict=True)
+    angles = zip("xyz", _rotation_degrees(pose.R), degrees, _rotation_degrees(true.R), strict=True)
     for axis, value, s, is_true in angles:
         row = numbers(value, 4), _half(s), numbers(is_true, 4), "deg"
         table.add_row(f"rotation {axis}", *row)
-    lengths = zip("xyz", found.t.tolist(), std[3:], true.t.tolist(), strict=True)
+    lengths = zip("xyz", pose.t.tolist(), std[3:], true.t.tolist(), strict=True)
     for axis, value, s, is_true in lengths:
         row = numbers(value, 4), _half(s), numbers(is_true, 4), solution.units
         table.add_row(f"translation {axis}", *row)
@@ -164,12 +164,12 @@ def sequence_table(metrics: "SequenceMetrics") -> "Table":
     return table
 
 
-def error_table(found: "ErrorTable") -> "Table":
+def error_table(errors: "ErrorTable") -> "Table":
     """Return a table of an evaluation, its note below it."""
-    table = _table(found.title, *found.columns)
-    table.caption, table.caption_justify = found.note or None, "left"
-    for row in found.rows:
-        if row[0] and found.columns[0] == "" and table.row_count:
+    table = _table(errors.title, *errors.columns)
+    table.caption, table.caption_justify = errors.note or None, "left"
+    for row in errors.rows:
+        if row[0] and errors.columns[0] == "" and table.row_count:
             table.add_section()
         table.add_row(*row)
     return table

@@ -23,11 +23,11 @@ def view(
         calibration = read_solution_folder(result)
         if truth is not None:
             read_truth(truth, calibration.solution)  # refused before a browser opens
-        found = truth or find_truth(result, calibration.solution)
+        truth_path = truth or find_truth(result, calibration.solution)
         with running_server(host, port) as server:
-            viewer = open_viewer(server, calibration, found)
+            viewer = open_viewer(server, calibration, truth_path)
             announce(server, browser, output)
-            output.summary({"address": address_of(server), "truth": found and str(found)})
+            output.summary({"address": address_of(server), "truth": truth_path and str(truth_path)})
             if viewer.comparison is not None:
                 viewer.comparison.join()
             for fault in viewer.faults or ():
