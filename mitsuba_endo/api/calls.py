@@ -73,20 +73,20 @@ def calibrate(
     record = as_rig(rig)
     if share:
         record = with_plan(record, share, "share")
-    frames, seen = as_frames(captures), KeptPhotographs()
-    maps = as_correspondences(frames, record, pattern, refine, map_convention, seen.keep)
+    frames, photographs = as_frames(captures), KeptPhotographs()
+    maps = as_correspondences(frames, record, pattern, refine, map_convention, photographs.keep)
     masks = Masks.at(Path(mask)) if mask is not None else None
     if masks:
         maps = [masks.applied(map_) for map_ in maps]
     checkpoint = None if resume is None else load_checkpoint(resume)
-    found = solve(maps, record, options, progress, checkpoint)
+    calibration = solve(maps, record, options, progress, checkpoint)
     images = photographs_in(frames, pattern) if refine and second_round and not checkpoint else []
     if images:
         more: dict[str, Any] = {"masked": masks.applied} if masks else {}
         if progress:
             more["progress"] = progress
-        found = calibrated_again(found, maps, images, pattern, record, options, more)
-    return Result(replace(found, photographs=seen), record)
+        calibration = calibrated_again(calibration, maps, images, pattern, record, options, more)
+    return Result(replace(calibration, photographs=photographs), record)
 
 
 def decode(

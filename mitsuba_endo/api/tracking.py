@@ -119,14 +119,14 @@ class TrackedSequence:
     The world is the first placed camera. Lengths are in :attr:`unit`.
     """
 
-    def __init__(self, found: SequenceResult, state: Callable[[Path], None] | None = None) -> None:
+    def __init__(self, result: SequenceResult, state: Callable[[Path], None] | None = None) -> None:
         """Wrap what was found.
 
         Args:
-            found: by a sequence.
+            result: by a sequence.
             state: writes a file from which the sequence can go on.
         """
-        self.found = found
+        self.found = result
         self._state = state
 
     @property
