@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import Advance, Debug, Json, Quiet, Session, session
-from .map_options import Mask
+from .map_options import Mask, mask_files
 from .stack_options import Height, Periods, Steps, Stripe, Width, numbers, pair
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def decode_stack(
         )  # fmt: skip
         paths = stack_paths(images)
         prepare_file(out, [*(p if isinstance(p, Path) else p.path for p in paths),
-                           *([mask] if mask else [])])  # fmt: skip
+                           *mask_files(mask)])  # fmt: skip
         masks = Masks.at(mask) if mask else None
         shift = pair(offset)
         reading = read_by_names(paths, request)

@@ -21,3 +21,10 @@ Mask = Annotated[
         show_default=False,
     ),
 ]
+
+
+def mask_files(mask: Path | None) -> list[Path]:
+    """Return the files that are read of ``--mask``: those of a folder one by one."""
+    if mask is None:
+        return []
+    return sorted(mask.iterdir()) if mask.is_dir() else [mask]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .console import EXIT_FAULT, Debug, Json, Quiet, session
-from .map_options import MapConvention, Mask
+from .map_options import MapConvention, Mask, mask_files
 
 if TYPE_CHECKING:
     from ..records.rig import Rig
@@ -51,6 +51,7 @@ def refine(
     with session(quiet, as_json, debug) as output:
         from ..decoding.image_files import full_scale, open_image
         from ..decoding.masks import Masks
+        from ..outputs import prepare_file
         from ..records.correspondence import check_map_path, load_map, write_map
         from ..records.map_convention import read_map_convention
         from ..records.rig import load_rig
@@ -58,6 +59,8 @@ def refine(
         from ..refine.refine_map import refine_map
 
         check_map_path(out)
+        drawn = [] if pattern.startswith("pattern:") else [Path(pattern)]
+        prepare_file(out, [map_file, image, rig, *drawn, *mask_files(mask)])
         record = load_rig(rig)
         size = record.projector.width, record.projector.height
         start = load_map(map_file, read_map_convention(map_convention), size)

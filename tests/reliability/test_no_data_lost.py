@@ -3,15 +3,21 @@
 Oracle of every test: the bytes of everything on disk before the command.
 """
 
+import inspect
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
+import mitsuba_endo as me
+from mitsuba_endo.cli.main import COMMANDS
 from mitsuba_endo.dataset.contact_sheet import write_contact_sheets
 from mitsuba_endo.dataset.reader import Dataset
+from mitsuba_endo.errors import InputError
 from mitsuba_endo.files import atomic_folder
 from mitsuba_endo.folder_mark import Kind
+from scripts.reliability.made_up import made_up
 from tests.cli.inputs import Result, run
 from tests.dataset.small import make_here, small_config
 from tests.reliability.results import MARK, contents, write_inputs, write_result
@@ -50,16 +56,45 @@ def _dataset(base: Path, out: Path) -> Result:
     return run("dataset", "--out", out, "--count", 1)
 
 
+def _recording(base: Path, out: Path) -> Result:
+    return run("render", "plane", "--trajectory", "creeping", "--frames", 2, "--out", out)
+
+
+def _sequence(base: Path, out: Path) -> Result:
+    return run("sequence", base / "map.exr", "--rig", base / "rig.yaml", "--out", out)
+
+
+def _from_python(save: Callable[[Path], None]) -> Command:
+    """Return a call as a command: what it raises is its sentence."""
+
+    def command(base: Path, out: Path) -> Result:
+        try:
+            save(out)
+        except InputError as error:
+            return Result(error.exit_code, "", f"error: {error}\n")
+        return Result(0, "", "")
+
+    return command
+
+
 FOLDERS: dict[str, tuple[Command, Kind]] = {
     "patterns": (_patterns, Kind.PATTERNS),
     "render": (_render, Kind.CAPTURE),
+    "render sequence": (_recording, Kind.RECORDING),
+    "sequence": (_sequence, Kind.SEQUENCE),
+    "Result.save": (_from_python(lambda out: me.Result(made_up()).save(out)), Kind.CALIBRATION),
+    # Nothing is found in it: refused before it is looked at, or the test fails.
+    "TrackedSequence.save": (
+        _from_python(lambda out: me.TrackedSequence(cast(Any, None)).save(out)), Kind.SEQUENCE,
+    ),
     "decode": (_decode, Kind.MAPS),
     "calibrate": (_calibrate, Kind.CALIBRATION),
     "demo": (_demo, Kind.DEMO),
     "export colmap": (_export("colmap"), Kind.COLMAP),
     "export mitsuba": (_export("mitsuba"), Kind.SCENE),
-}
-"""Every command that writes a folder which it may replace, and what it calls that."""
+    "export ros": (_export("ros"), Kind.ROS),
+}  # fmt: skip
+"""Every command and call that writes a folder which it may replace, and what it calls that."""
 
 
 @pytest.fixture
@@ -126,7 +161,10 @@ def test_unmarked_folder_stays(base: Path, name: str):
     assert contents(base) == before
 
 
-@pytest.mark.parametrize("name", ["patterns", "export colmap", "export mitsuba"])
+OWN = ["patterns", "export colmap", "export mitsuba", "export ros", "Result.save"]
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_own_folder_is_replaced(base: Path, name: str):
     """Oracle: the files of a second run alone; those of the first are gone."""
     command, kind = FOLDERS[name]
@@ -214,6 +252,15 @@ INSIDE = {
     ),
     "render scene": (("render", "in/rig.yaml"), Kind.CAPTURE),
     "render setting": (("render", "plane", "--set", "pattern=in/photo.png"), Kind.CAPTURE),
+    "render trajectory": (
+        ("render", "plane", "--trajectory", "in/rig.yaml", "--frames", "2"), Kind.RECORDING,
+    ),
+    "sequence map": (("sequence", "in/map.exr", "--rig", "rig.yaml"), Kind.SEQUENCE),
+    "sequence rig": (("sequence", "map.exr", "--rig", "in/rig.yaml"), Kind.SEQUENCE),
+    "sequence mask": (
+        ("sequence", "map.exr", "--rig", "rig.yaml", "--mask", "in/photo.png"), Kind.SEQUENCE,
+    ),
+    "export ros": (("export", "in/result", "--format", "ros"), Kind.ROS),
     "export colmap": (("export", "in/result", "--format", "colmap"), Kind.COLMAP),
     "export mitsuba": (("export", "in/result/solution.json", "--format", "mitsuba"), Kind.SCENE),
 }  # fmt: skip
@@ -247,6 +294,16 @@ FILES = {
     ),
     "report": (("report", "own", "--truth", "truth/page.html"), ("own/page.html",
                                                                 "truth/page.html")),
+    "report of several": (
+        ("report", "result", "own", "--truth", "truth/page.html"),
+        ("own/page.html", "truth/page.html"),
+    ),
+    "refine": (
+        ("refine", "own/map.npz", "--image", "a.exr", "--rig", "rig.yaml", "--pattern", "b.exr",
+         "--mask", "masks"),
+        ("own/map.npz", "a.exr", "b.exr", "masks/map.exr"),
+    ),
+    "export kalibr": (("export", "own", "--format", "kalibr"), ("own/solution.json",)),
     "export ply": (("export", "own", "--format", "ply"), ("own/solution.json", "own/surface.ply")),
     "export opencv": (("export", "own", "--format", "opencv"), ("own/solution.json",)),
 }  # fmt: skip
@@ -266,7 +323,9 @@ def test_output_file_that_is_an_input(
         with atomic_folder(base / folder, kind) as aside:
             write_result(aside, file)
             (aside / "page.html").write_text("mine")
-    for image in ("a.exr", "b.exr"):
+            (aside / "map.npz").write_text("mine")
+    (base / "masks").mkdir()
+    for image in ("a.exr", "b.exr", "masks/map.exr"):
         (base / image).write_bytes((base / "map.exr").read_bytes())
     out = Path(target)
     if through == "link":
@@ -275,6 +334,13 @@ def test_output_file_that_is_an_input(
     before = contents(base)
     _refused(run(*FILES[name][0], "--out", out), "choose another name")
     assert contents(base) == before
+
+
+def test_every_command_that_writes_is_among_them():
+    """Oracle: the commands' own options."""
+    writing = {c.__name__ for c in COMMANDS if "out" in inspect.signature(c).parameters}
+    tried = {name.partition(" ")[0].replace("-", "_") for name in [*FOLDERS, *FILES, "dataset"]}
+    assert writing <= tried
 
 
 def test_reports_and_metrics_may_be_replaced_in_a_result(base: Path, monkeypatch):
