@@ -1,5 +1,6 @@
 """The state of an optimisation on disk, from which it can go on."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,14 @@ from ..errors import InputError
 from ..files import atomic_path
 from ..reading.npz import Arrays, open_npz
 from ..reading.regular import is_file
+from .rig import Rig
 from .sealed_arrays import SEAL, check_seal, seal_of
 
 FILE = "state.npz"
-FORMAT = 3
-"""Of the file; version 0.1 wrote files without a number, and 2 had no checksum."""
+FORMAT = 4
+"""Of the file; version 0.1 wrote files without a number, 2 had no checksum, 3 no devices."""
+
+_CAMERA = ("model", "width", "height", "K", "distortion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,9 @@ class Checkpoint:
     """Everything of an optimisation that its input files do not hold; lengths in baselines."""
 
     law: str
+    devices: str
+    """The rig's camera and pattern, from which surfaces and correspondences were chosen; see
+    :func:`devices_of`."""
     last_stage: bool
     """Whether the robust loss was in its last stage."""
     names: list[str]
@@ -51,11 +58,19 @@ class Checkpoint:
     """Of every block of unknowns one array for each owner: a pose as (4, 4), others as (n,)."""
 
 
+def devices_of(rig: Rig) -> str:
+    """Return a rig's camera and size of the pattern as JSON, to be compared."""
+    camera = rig.camera.model_dump(mode="json", include=set(_CAMERA))
+    pattern = {"width": rig.projector.width, "height": rig.projector.height}
+    return json.dumps({"camera": camera, "projector": pattern})
+
+
 def save_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint as npz."""
     arrays = {
         "format": np.array(FORMAT),
         "law": np.array(checkpoint.law),
+        "devices": np.array(checkpoint.devices),
         "last_stage": np.array(checkpoint.last_stage),
         "names": np.array(checkpoint.names),
         "blocks": np.array(list(checkpoint.values)),
@@ -101,6 +116,7 @@ def _read(data: Arrays) -> Checkpoint:
     blocks = [str(name) for name in data.get("blocks", (None,), "U")]
     return Checkpoint(
         law=str(data.get("law", (), "U")),
+        devices=str(data.get("devices", (), "U")),
         last_stage=bool(data.get("last_stage", (), "b")),
         names=names,
         used=[data.get(f"used_{k}", (None, None), "b") for k in range(len(names))],

@@ -17,6 +17,7 @@ from ..records.solution import Outcome
 from ..sanity.examine import examine
 from .conclusion import infer, stopping
 from .contradictions import check_surface, unused_deviations
+from .frames.resume import check_rig
 from .frames.weights import balanced
 from .history import History
 from .inference.fit import Fit
@@ -43,7 +44,8 @@ def calibrate(
         rig: what is known, and which unknowns the frames share.
         options: how to solve.
         progress: called with the share of the work done and the name of the step.
-        resume: an earlier calibration of these maps to go on with; its projection model is kept.
+        resume: an earlier calibration of these maps to go on with, of the same camera and pattern;
+            its projection model is kept.
         observe: called after every iteration with where it stands, lengths in baselines.
 
     Returns:
@@ -57,6 +59,8 @@ def calibrate(
     minimiser_of(options)  # an unknown one is told before any work
     examined = examine(as_maps(maps), rig)
     check_surface(options, rig, len(examined.maps), resume)
+    if resume is not None:
+        check_rig(resume, rig)
     backend.ensure_derivatives()
     camera = rig.camera.to_model()
     # One thread: the matrices are too small for two, which then wait for each other.

@@ -78,7 +78,7 @@ def _checkpoint(surface: SurfaceEstimate) -> Checkpoint:
     index = np.stack(np.divmod(np.arange(count), 16), -1)
     lattice = {"cell": np.array(0.05), "ij": index, "faces": surface.faces}
     return Checkpoint(
-        law="pinhole", last_stage=True, names=list(NAMES),
+        law="pinhole", devices="{}", last_stage=True, names=list(NAMES),
         used=[np.ones((HEIGHT, WIDTH), bool)] * 2,
         surfaces=[SurfaceRecord("lattice", lattice, np.full(count, 0.01), 0.1, 1800.0)],
         values={

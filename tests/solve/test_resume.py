@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,6 +160,43 @@ def test_another_plan_is_refused(case: tuple[Views, Rig, Calibration]) -> None:
     other = rig.model_copy(update={"share": rig.share.model_copy(update={"surface": surface})})
     with pytest.raises(InputError, match=r"share\.surface"):
         calibrate(views.maps, other, QUICK, resume=checkpoint_of(oracle))
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "words"),
+    [
+        ("projector", {"law": "direction_cosine"}, "with pinhole, not direction_cosine"),
+        ("projector", {"width": 530}, "another camera or size of the pattern"),
+        ("camera", {"distortion": [-0.2, 0.05]}, "another camera or size of the pattern"),
+        ("camera", {"K": [[90.0, 0, 50], [0, 90, 40], [0, 0, 1]]}, "another camera"),
+    ],
+)
+def test_another_rig_is_refused(
+    case: tuple[Views, Rig, Calibration], part: str, change: dict[str, Any], words: str
+) -> None:
+    """Another law was passed over, and another camera led elsewhere than a calibration anew."""
+    views, rig, oracle = case
+    data = rig.model_dump(mode="json")
+    other = Rig.model_validate(data | {part: data[part] | change})
+    with pytest.raises(InputError, match=words):
+        calibrate(views.maps, other, QUICK, resume=checkpoint_of(oracle))
+
+
+def test_another_scale_or_a_value_that_is_known_may_be_given(
+    case: tuple[Views, Rig, Calibration],
+) -> None:
+    """Oracle: the lengths by hand; the focal length that was given."""
+    views, rig, oracle = case
+    data = rig.model_dump(mode="json")
+    data["scale"] = {"baseline": 2 * views.baseline}
+    data["projector"]["focal"] = {"value": FOCAL, "refine": False}
+    data["projector"]["law"] = "auto"
+    found = calibrate(views.maps, Rig.model_validate(data), QUICK, resume=checkpoint_of(oracle))
+    assert found.solution.projector.focal.value == FOCAL
+    assert found.solution.projector.focal.status == "fixed"
+    t = found.solution.frames[0].projector_from_camera.t
+    assert t is not None
+    assert np.linalg.norm(t) == pytest.approx(2 * views.baseline, rel=1e-3)
 
 
 def test_a_lattice_is_not_gone_on_with_as_a_mesh(case: tuple[Views, Rig, Calibration]) -> None:

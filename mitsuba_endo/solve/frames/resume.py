@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...geometry.cameras import CameraModel
 from ...geometry.transforms import RigidTransform
-from ...records.checkpoint import Checkpoint, SurfaceRecord
+from ...records.checkpoint import Checkpoint, SurfaceRecord, devices_of
 from ...records.correspondence import CorrespondenceMap
-from ...records.rig import Rig
+from ...records.rig import AUTO_LAW, Rig
 from ..costs.objective import Problem, make_problem
 from ..costs.registry import priors_of
 from ..costs.smoothness import smoothness
@@ -22,8 +22,8 @@ from ..unknowns.state import State
 from .initial_state import observations
 
 
-def checkpoint_of(result: OptimisationResult) -> Checkpoint:
-    """Describe a result, or where an interrupted optimisation stood."""
+def checkpoint_of(result: OptimisationResult, rig: Rig) -> Checkpoint:
+    """Describe a result, or where an interrupted optimisation stood; the rig is what was given."""
     problem, state = result.problem, result.state
     used = []
     for frame in problem.observed:
@@ -32,6 +32,7 @@ def checkpoint_of(result: OptimisationResult) -> Checkpoint:
         used.append(mask)
     return Checkpoint(
         law=problem.law,
+        devices=devices_of(rig),
         last_stage=result.noise.last,
         names=[f.name for f in problem.observed],
         used=used,
@@ -45,6 +46,26 @@ def checkpoint_of(result: OptimisationResult) -> Checkpoint:
         ],
         values={name: [_array(v) for v in values] for name, values in state.values.items()},
     )  # fmt: skip
+
+
+def check_rig(checkpoint: Checkpoint, rig: Rig) -> None:
+    """Refuse another camera, pattern or projection model than the checkpoint was made with.
+
+    Its surfaces and the correspondences that it leaves out were chosen for them, so that the way
+    on would end elsewhere than a calibration anew. Scale, priors and what is known may differ.
+
+    Raises:
+        InputError: names the entry of the rig.
+    """
+    again = "give the same rig, or start anew without --resume"
+    if checkpoint.devices != devices_of(rig):
+        raise InputError(
+            "the earlier calibration was of another camera or size of the pattern",
+            "camera, projector", again,
+        )  # fmt: skip
+    if rig.projector.law not in (AUTO_LAW, checkpoint.law):
+        what = f"the earlier calibration was with {checkpoint.law}, not {rig.projector.law}"
+        raise InputError(what, "projector.law", again)
 
 
 def resumed_problem(

@@ -87,7 +87,7 @@ def assemble(
     return Calibration(
         solution, refined, surfaces[0], frame_maps(fit, renderings),
         with_fixed_cost(fit.result.trace, fit.result.noise),
-        checkpoint_of(fit.result), dict(enumerate(surfaces[1:], 1)),
+        checkpoint_of(fit.result, rig), dict(enumerate(surfaces[1:], 1)),
         scaled(fit.history, unit.factor),
     )  # fmt: skip
 

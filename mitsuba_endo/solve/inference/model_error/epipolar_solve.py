@@ -155,5 +155,6 @@ def noise_of(r: Floats) -> float:
 
 def robust_cost(r: Floats, sigma: float) -> float:
     """Return the robust cost, noise variances."""
-    square = np.where(np.isfinite(r), (r / sigma) ** 2, _FAR**2)
+    with np.errstate(over="ignore"):  # a step that went too far costs infinitely much
+        square = np.where(np.isfinite(r), (r / sigma) ** 2, _FAR**2)
     return float(_CAUCHY**2 / 2 * np.log1p(square / _CAUCHY**2).sum())
