@@ -49,12 +49,14 @@ def evaluate(
     """Compare a result with the truth: errors, intervals, and whether these hold the truth."""
     with session(quiet, as_json, debug) as output:
         from ..evaluate.kinds import evaluate_result
+        from ..evaluate.truths import check_apart
         from ..outputs import prepare_file
         from ..show.read_sequence import is_sequence_folder
         from .summary import sequence_table
 
         read = [file for path in (result, *truth) for file in result_files(path)]
         prepare_file(out, read, [METRICS])
+        check_apart(result, truth)
         if is_sequence_folder(result):
             tracked = evaluate_tracked(result, truth)
             tracked.save(out)

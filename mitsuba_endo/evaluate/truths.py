@@ -9,7 +9,7 @@ from ..decoding.image_files import natural_order
 from ..errors import InputError
 from ..reading.regular import exists, is_file
 from ..records.calibration_files import read_calibration
-from ..records.solution import Frame, Solution
+from ..records.solution import Frame, Solution, solution_file
 from .matching import MatchBy, Matched, match_names
 
 Pair = tuple[Frame, Frame]
@@ -60,6 +60,21 @@ def check_sizes(solution: Solution, truth: Solution) -> None:
             f"images of {there} pixels, but the solution's are {here}", "truth: camera",
             "give the truth of the same capture",
         )  # fmt: skip
+
+
+def check_apart(result: str | Path, truths: Sequence[str | Path]) -> None:
+    """Refuse to compare a result with itself: every error would be zero.
+
+    Raises:
+        InputError: names the truth that is the result.
+    """
+    read = solution_file(result).resolve()
+    for truth in truths:
+        if solution_file(truth).resolve() == read:
+            raise InputError(
+                f"is the result itself ({read.name})", str(truth),
+                "give another file, e.g. the truth.json that render wrote",
+            )  # fmt: skip
 
 
 def load_truths(paths: Sequence[str | Path]) -> Truths:

@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from .regular import JSON, YAML, read_text
 
 DEEPEST = 40
@@ -26,6 +26,20 @@ class _RepeatedKey(yaml.YAMLError):
 
     def __init__(self, key: str, line: int) -> None:
         self.key, self.line = key, line
+
+
+class _RepeatedNameError(ValueError):
+    """An object of JSON has a name twice: Python would take the last one without a word."""
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the object of a JSON text, in which no name stands twice."""
+    data = dict[str, Any]()
+    for name, value in pairs:
+        if name in data:
+            raise _RepeatedNameError(name)
+        data[name] = value
+    return data
 
 
 class _Loader(yaml.SafeLoader):
@@ -80,7 +94,7 @@ def read_json(path: str | Path, todo: str = "give a solution or truth file") -> 
     """Read a JSON object.
 
     Raises:
-        InputError: missing, too large or too deep, no JSON, or no object.
+        InputError: missing, too large or too deep, no JSON, a name that stands twice, or no object.
     """
     return parse_json(read_text(path, JSON), str(path), todo)
 
@@ -88,11 +102,13 @@ def read_json(path: str | Path, todo: str = "give a solution or truth file") -> 
 def parse_json(text: str, source: str, todo: str) -> dict[str, Any]:
     """Read a JSON object from a text; see :func:`read_json`."""
     try:
-        data = json.loads(text)
+        data = json.loads(text, object_pairs_hook=_object)
     except json.JSONDecodeError as error:
         raise InputError(
             f"is not valid JSON (line {error.lineno})", source, "mend or remake it"
         ) from None
+    except _RepeatedNameError as error:
+        raise InputError(f"{shown(str(error))} stands twice", source, "keep one") from None
     except (ValueError, RecursionError):
         raise InputError(
             "is not valid JSON (a number too long, or too deep)", source, "mend or remake it"

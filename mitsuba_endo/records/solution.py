@@ -221,17 +221,23 @@ def save_solution(path: str | Path, solution: Solution) -> None:
         aside.write_text(text + "\n", encoding="utf-8")
 
 
+def solution_file(path: str | Path) -> Path:
+    """Return the solution or truth file that a folder stands for; another path as it is."""
+    path = Path(path)
+    if not os.path.isdir(path):  # which takes names of any length
+        return path
+    name, other = "solution.json", "truth.json"
+    only_other = (path / other).exists() and not (path / name).exists()
+    return path / (other if only_other else name)
+
+
 def load_solution(path: str | Path) -> Solution:
     """Read a solution or truth file, or the one in a solution folder.
 
     Raises:
         InputError: names the file and field.
     """
-    path = Path(path)
-    if os.path.isdir(path):  # which takes names of any length
-        name, other = "solution.json", "truth.json"
-        only_other = (path / other).exists() and not (path / name).exists()
-        path = path / (other if only_other else name)
+    path = solution_file(path)
     from .solution_checks import check_solution  # it knows this module
 
     return check_solution(validate(Solution, read_json(path), str(path)), str(path))

@@ -87,3 +87,20 @@ def test_truths_may_be_named_one_by_one(captures: Path, tmp_path: Path):
         "frame six/map.exr: the truth has a frame of this name in another folder" in result.stderr
     )
     assert run(*run_, "--match", "order").exit_code == 0
+
+
+@pytest.mark.parametrize("name", ["result", "result/solution.json", "link"])
+def test_a_result_is_not_its_own_truth(tmp_path: Path, name: str):
+    """Oracle: the sentence; all errors were zero, also where a truth lies beside."""
+    (tmp_path / "result").mkdir()
+    save_solution(tmp_path / "result" / "solution.json", _solution(["a"], 1.0, Outcome.CONVERGED))
+    save_solution(tmp_path / "result" / "truth.json", _solution(["a"], FOCAL, Outcome.TRUTH))
+    (tmp_path / "link").symlink_to(tmp_path / "result")
+    out = tmp_path / "metrics.json"
+    result = run("evaluate", tmp_path / "result", "--truth", tmp_path / name, "--out", out)
+    assert result.exit_code == 2
+    assert f"{tmp_path / name}: is the result itself (solution.json); give another" in result.stderr
+    assert not out.exists()
+    beside = tmp_path / "result" / "truth.json"
+    result = run("evaluate", tmp_path / "result", "--truth", beside, "--out", out)
+    assert result.exit_code == 0, result.stderr

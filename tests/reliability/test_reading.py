@@ -141,6 +141,16 @@ def test_a_key_that_stands_twice_is_refused_and_a_merged_one_is_not(tmp_path: Pa
     assert read_yaml(path) == yaml.safe_load(merged)
 
 
+@pytest.mark.parametrize("text", ['{"a": 1, "b": 2, "a": 1}', '{"c": [{"a": 1, "b": 2, "a": 3}]}'])
+def test_a_name_that_stands_twice_in_json_is_refused(tmp_path: Path, text: str):
+    """Python takes the last one. Oracle: the sentence of every reader of JSON."""
+    path = tmp_path / "a.json"
+    path.write_text(text)
+    for read in (load_solution, load_rig, read_file_storage):
+        with pytest.raises(InputError, match=r"a\.json: (a: |'a' )stands twice"):
+            read(path)
+
+
 @pytest.mark.parametrize("case", YAML)
 def test_yaml(tmp_path: Path, case: str):
     (tmp_path / "a.yaml").write_text(YAML[case])
