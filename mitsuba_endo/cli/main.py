@@ -18,10 +18,12 @@ from .refine import refine
 from .render import render
 from .report import report
 from .sequence import sequence
+from .usage import Commands
 from .view import view
 
 app = typer.Typer(
     name="mitsuba-endo",
+    cls=Commands,
     help="Calibrate camera-projector pairs and 3D endoscopes without a target.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

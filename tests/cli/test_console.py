@@ -142,3 +142,29 @@ def test_long_work_tells_its_steps_in_a_log(
         now[0] = 99.0
         advance(0.5, "Optimising")
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["refine", "a.npz", "--out", "b.npz"], "Missing option '--image'"),
+        (["evaluate"], "Missing argument 'RESULT'"),
+        (["nosuch"], "No such command 'nosuch'"),
+        (["calibrate", "--nosuch", "1"], "No such option: --nosuch"),
+        (["dataset", "--out", "a", "--count", "-3"], "Invalid value for '--count'"),
+    ],
+)
+def test_a_wrong_command_line_is_one_sentence(arguments: list[str], said: str):
+    """Oracle: the contract of bad input; Typer draws a box of five lines."""
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert result.stderr.startswith(f"error: {said}")
+    assert result.stderr.endswith(" --help.\n")
+    assert result.stderr.count("\n") == 1
+
+
+def test_no_command_is_answered_with_the_help():
+    """Oracle: the help that is asked for."""
+    assert run().stdout.split() == run("--help").stdout.split()
+    assert run().exit_code == 2
