@@ -61,7 +61,7 @@ def test_depth_of_a_frame_is_the_scenes(result: me.TrackedSequence, clean: Recor
 def test_a_saved_sequence_is_gone_on_with(
     result: me.TrackedSequence, clean: Recording, tmp_path: Path
 ) -> None:
-    """Oracle: the frames before stay where they were."""
+    """Oracle: the frames before stay where they were, but for what one more frame adjusts."""
     result.save(tmp_path / "out")
     assert load_solution(tmp_path / "out").outcome == "converged"
     arrays = [clean.map(k).q * (np.nan if k == 4 else 1) for k in range(COUNT)]
@@ -74,7 +74,7 @@ def test_a_saved_sequence_is_gone_on_with(
     for a, b in zip(result.frames, again.frames[:COUNT], strict=True):
         assert (a.lost, a.number) == (b.lost, b.number)
         if a.world_from_camera is not None and b.world_from_camera is not None:
-            assert np.array_equal(a.world_from_camera.t, b.world_from_camera.t)
+            assert np.linalg.norm(a.world_from_camera.t - b.world_from_camera.t) < 0.01
     with pytest.raises(me.InputError, match="has changed since"):
         me.track(arrays[1:], clean.rig(), options=FEW, resume=tmp_path / "out")
 
