@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from ..decoding.image_files import read_frames
-from ..decoding.pattern_option import coded_grid
 from ..records.calibration import Calibration
 from ..records.correspondence import CorrespondenceMap
 from ..records.rig import Rig
-from ..refine.image_decoder import PATTERN
+from ..refine.image_decoder import grid_of
 from ..refine.pattern_image import grid_image
 from ..rounds.second_round import second_round
 from ..solve.options import Options
@@ -35,6 +34,6 @@ def calibrated_again(
         options: how to solve.
         more: further arguments of :func:`..rounds.second_round.second_round`.
     """
-    grid = coded_grid(pattern or PATTERN, rig.projector.width, rig.projector.height)
+    drawn = grid_image(grid_of(pattern, rig))
     pictures = ((frame.name, frame.image) for frame in read_frames(images))
-    return second_round(first, maps, pictures, grid_image(grid), rig, options, **more)[1]
+    return second_round(first, maps, pictures, drawn, rig, options, **more)[1]

@@ -49,13 +49,11 @@ class Photographs:
     ) -> "Calibration":  # fmt: skip
         """Return the calibration after the second round, and say what that found."""
         from ..decoding.masks import Masks
-        from ..decoding.pattern_option import coded_grid
-        from ..refine.image_decoder import PATTERN
+        from ..refine.image_decoder import grid_of
         from ..refine.pattern_image import grid_image
         from ..rounds.second_round import second_round
 
-        size = rig.projector.width, rig.projector.height
-        grid = coded_grid(self.pattern or PATTERN, *size)
+        grid = grid_of(self.pattern, rig)
         masks = Masks.at(self.mask) if self.mask else None
         more: dict[str, Any] = {"masked": masks.applied} if masks else {}
         second, calibration = second_round(

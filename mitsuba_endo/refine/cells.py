@@ -96,6 +96,11 @@ def _interpolation(
     )  # fmt: skip
 
 
+def middles(field: NDArray) -> NDArray:
+    """Return the pixels (h, w, ...) in the middles of cells, of a field (h SIDE, w SIDE, ...)."""
+    return field[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE]
+
+
 def padded(image: NDArray, value: float = 0.0) -> NDArray:
     """Return an image (H, W, ...) filled up on the right and below to whole cells."""
     fill = [(0, -n % SIDE) for n in image.shape[:2]]

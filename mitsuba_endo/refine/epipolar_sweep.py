@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..geometry.cameras import CameraModel
 from ..geometry.projection_models import ProjectorModel
 from ..geometry.transforms import RigidTransform
-from .cells import SIDE, Image, mean, padded
+from .cells import SIDE, Image, mean, middles, padded
 from .image_view import ImageView
 from .iterate import DARK
 from .pattern_image import PatternImage
@@ -93,7 +93,7 @@ def _coordinates(geometry: KnownGeometry, shape: tuple[int, ...]) -> NDArray[np.
     """Return coordinates (h, w, K, 2) of the cells' middles at all inverse ranges."""
     x, y = (np.arange(SIDE // 2, n, SIDE, dtype=float) for n in (shape[1], shape[0]))
     rays = geometry.camera.rays(np.stack(np.meshgrid(x, y), -1))
-    near = padded(1 / geometry.range.astype(float), np.nan)[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE]
+    near = middles(padded(1 / geometry.range.astype(float), np.nan))
     around = _filled(near)[..., None] * np.geomspace(FARTHEST, NEAREST, HYPOTHESES)
     points = geometry.projector_from_camera.apply(rays[:, :, None] / around[..., None])
     return geometry.projector.project(points).astype(np.float32)

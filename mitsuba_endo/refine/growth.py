@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .acceptance import judge
-from .cells import SIDE, Image, repeated
+from .cells import Image, middles, repeated
 from .iterate import Comparison, iterate
 from .options import RefineOptions
 from .scattered_light import without_pull
@@ -81,7 +81,7 @@ def grow(
     for value, share in ((verdict.correlation, CLEAR), (verdict.margin, SURE)):
         added &= value > share * float(np.median(value[grown.good]))
     added &= np.maximum(covariance[..., 0], covariance[..., 2]) < KNOWN**2
-    added &= frame.pattern.holds(refined.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE])
+    added &= frame.pattern.holds(middles(refined.q))
     q = np.where(repeated(added)[..., None], without_pull(wider, refined), grown.q)
     kept = np.where(added[..., None], covariance, grown.covariance)
     return Grown(q, kept, grown.good | added, grown.added | added)

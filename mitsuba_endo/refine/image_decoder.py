@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..decoding.grid.decode import DecodedGrid, decode_image
+from ..decoding.grid_pattern import CodedGrid
 from ..decoding.image_files import ImageFrame
 from ..decoding.network import load_network
 from ..decoding.pattern_option import coded_grid
@@ -24,6 +25,19 @@ class DecodedImage:
     map: DecodedMap
 
 
+def grid_of(pattern: str | None, rig: Rig) -> CodedGrid:
+    """Return the coded grid that a rig projects.
+
+    Args:
+        pattern: as ``--pattern`` takes it; None: :data:`PATTERN`.
+        rig: size of the pattern.
+
+    Raises:
+        InputError: a wrong pattern.
+    """
+    return coded_grid(pattern or PATTERN, rig.projector.width, rig.projector.height)
+
+
 class ImageDecoder:
     """Decodes images of one rig, one after the other; grid and network are made once."""
 
@@ -41,9 +55,8 @@ class ImageDecoder:
         Raises:
             InputError: a wrong pattern or network.
         """
-        size = rig.projector.width, rig.projector.height
         self._rig, self._refine = rig, refine
-        self._grid = coded_grid(pattern or PATTERN, *size)
+        self._grid = grid_of(pattern, rig)
         self._network = load_network(weights)
 
     def decode(self, frame: ImageFrame) -> DecodedImage:

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..records.correspondence import CorrespondenceMap, relative_weight
 from .acceptance import judge
-from .cells import SIDE, Image, Links, blend, padded, repeated
+from .cells import Image, Links, blend, middles, padded, repeated
 from .epipolar_sweep import KnownGeometry, Sweep, sweep
 from .image_view import ImageView, view_of
 from .iterate import FIRST_BLUR, iterate
@@ -90,7 +90,7 @@ def refine_against_scene(
 
 def _of_cells(map_: CorrespondenceMap) -> NDArray[np.bool_]:
     """Return the cells (h, w) whose middle has a coordinate."""
-    return padded(map_.valid, False)[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE]
+    return middles(padded(map_.valid, False))
 
 
 def _off(q: Image, matched: Sweep) -> tuple[Image, Image]:
@@ -103,7 +103,7 @@ def _off(q: Image, matched: Sweep) -> tuple[Image, Image]:
 
 def _confirmed(first: CorrespondenceMap, matched: Sweep) -> NDArray[np.bool_]:
     """Tell the cells of the first map that lie near their line and the best match on it."""
-    q = padded(first.q, np.nan)[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE]
+    q = middles(padded(first.q, np.nan))
     across, along = _off(q, matched)
     return (across < ACROSS) & (np.hypot(across, along) < FROM_MATCH)
 
@@ -131,7 +131,7 @@ def _added(
     refined = iterate(frame, q, options)
     covariance = cell_covariance(frame, refined)
     verdict = judge(frame, refined, covariance)
-    across, along = _off(refined.q[SIDE // 2 :: SIDE, SIDE // 2 :: SIDE], matched)
+    across, along = _off(middles(refined.q), matched)
     added = ~kept & (matched.margin > SURE) & verdict.good
     added &= (across < MOVED_ACROSS) & (along < MOVED_ALONG)
     large = _large(kept | added, frame.links)
