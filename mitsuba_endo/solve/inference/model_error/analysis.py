@@ -156,8 +156,8 @@ class ModelCheck:
 
     def surface_error(self, surface: int) -> Floats:
         """Return what may be left (V,) of the error that given values made to a surface."""
-        assert self.nuisance is not None
-        error = self.nuisance if self.correction is None else self.correction
+        error = self.correction or self.nuisance
+        assert error is not None
         return self.correction_std * error.surface_shifts[surface]
 
     @property
@@ -165,9 +165,8 @@ class ModelCheck:
         """(G, G) what errors of the given values add to the covariance, None where nothing."""
         if self.nuisance is None:
             return None
-        shifts, own = self.causes.shifts if self.wrong else [], self.nuisance.shift
-        if self.correction is not None:
-            own = self.correction.shift
+        shifts = self.causes.shifts if self.wrong else []
+        own = (self.correction or self.nuisance).shift
         base = own if self.corrects else np.zeros_like(own)
         shifts = [self.correction_std * own, *(s - base for s in shifts)]
         return self.nuisance.covariance + _spread(shifts)
@@ -215,9 +214,7 @@ def _doubting(check: ModelCheck, extended: Extended, rig: Rig, variance: float) 
     if completed.refuted_plan:  # that is no error of given values
         return completed
     priors = {name: np.sqrt(effect) * root for name, root in given_errors.roots.items()}
-    return replace(
-        completed, correction=correction(extended, priors, given_errors.step, causes.ends)
-    )
+    return replace(completed, correction=correction(extended, priors, given_errors, causes.ends))
 
 
 def _refits(result: OptimisationResult, rig: Rig, tests: Tests) -> list[Refit]:

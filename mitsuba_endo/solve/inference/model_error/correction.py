@@ -21,6 +21,7 @@ from ...unknowns.block import BLOCKS
 from ...unknowns.layout import Layout
 from ...unknowns.state import State
 from .extended import Extended, over
+from .nuisance import Nuisance
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ class DoubtTerm(ResidualTerm):
 
 
 def correction(
-    extended: Extended, roots: Mapping[str, Floats], step: Floats, others: Sequence[State] = ()
+    extended: Extended, roots: Mapping[str, Floats], first: Nuisance, others: Sequence[State] = ()
 ) -> Correction | None:
     """Return the correction of a fit, None where nothing that was tried lowers the cost.
 
@@ -76,7 +77,7 @@ def correction(
         extended: the fit with its given values' columns.
         roots: square-root information of the given values, against data of which the information
             is divided by no design effect.
-        step: (G,) of unknowns and given values to first order.
+        first: by how much unknowns, given values and surfaces are off, to first order.
         others: states of unknowns and given values to which gross errors led, if they did.
     """
     result = extended.result
@@ -84,12 +85,12 @@ def correction(
     minimiser = LevenbergMarquardt(_TOLERANCE, _ITERATIONS)
     base = evaluate(problem, extended.state)
     starts = [_with_values_of(extended, other) for other in others]
-    starts = starts or [_stepped(extended, problem, step, 1.0)]
+    starts = starts or [_stepped(extended, problem, first, 1.0)]
     best = min((_followed(problem, start) for start in starts), key=lambda at: at.cost(judge))
     held = _held(extended, roots, best.state)
     best = evaluate(problem, minimiser.run(held, best.state, judge).state)
     if best.cost(judge) >= base.cost(judge):
-        starts = [_stepped(extended, problem, step, share) for share in _SHARES]
+        starts = [_stepped(extended, problem, first, share) for share in _SHARES]
         tried = [base, best, *(_followed(problem, start) for start in starts)]
         best = min(tried, key=lambda at: at.cost(judge))
         best = minimiser.run(problem, best.state, judge).evaluation
@@ -117,10 +118,10 @@ def _held(extended: Extended, roots: Mapping[str, Floats], state: State) -> Prob
     return extended.result.problem.with_layout(extended.layout, *terms, DoubtTerm(layout, tight))
 
 
-def _stepped(extended: Extended, problem: Problem, step: Floats, share: float) -> State:
+def _stepped(extended: Extended, problem: Problem, first: Nuisance, share: float) -> State:
     """Return the state after a share of the step to first order."""
-    surfaces = [-share * (X @ step) for X in extended.responses]  # they give way: -A^-1 B
-    return problem.retract(extended.state, surfaces, share * step[: extended.layout.columns])
+    surfaces = [share * shift for shift in first.surface_shifts]
+    return problem.retract(extended.state, surfaces, share * first.step[: extended.layout.columns])
 
 
 def _with_values_of(extended: Extended, other: State) -> State:

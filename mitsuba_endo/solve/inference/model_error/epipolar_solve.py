@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....records.rig import Rig
-from ....robust import MAD_TO_STD
+from ....robust import robust_std
 from ...costs.coordinate_residual import Observations
 from ...minimisers.result import OptimisationResult
 from ...unknowns.block import BLOCKS
@@ -150,7 +150,8 @@ def _jacobian(sample: EpipolarSample, variant: ModelVariant, at: Point) -> Float
 
 
 def noise_of(r: Floats) -> float:
-    return max(MAD_TO_STD * float(np.nanmedian(np.abs(r))), 1e-6)
+    """Return the standard deviation of residuals, pattern pixels; NaN = none there."""
+    return max(robust_std(r[~np.isnan(r)]), 1e-6)
 
 
 def robust_cost(r: Floats, sigma: float) -> float:
